@@ -1,0 +1,179 @@
+// The plant's front door: build a Model from a Description, then step it.
+//
+//     Model model = Model::build(description);           // or throws ModelError, naming device and rule
+//     Operators operators(model);  State state(model);  Scratch scratch(model);
+//     Inputs inputs(model);  Outputs outputs(model);
+//     inputs.value[model.input("clutch.F1.pressure_command")] = 18e5;
+//     step(model, operators, state, inputs, outputs, scratch);          // advances by model.step_size()
+//
+// Six roles that never mix: Model (parameters, const after build), Operators (cached matrices per mode;
+// dropping them changes no bit), State (one block; its bytes are a snapshot), Inputs, Outputs, Scratch
+// (nothing in it survives a step).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "plant/description.h"
+#include "plant/realtime.h"
+#include "plant/signal.h"
+
+namespace shiftrig::plant {
+
+// What is wrong with a description: the device, its field and the rule, so that io/ can add file and line.
+class ModelError : public std::runtime_error {
+  public:
+    ModelError(std::string device_kind, std::string device_name, std::string field_name, std::string rule_text);
+    std::string kind;    // "clutch", "mass", …
+    std::string device;  // "F2"
+    std::string field;   // "inertia", empty if the rule is about the device as a whole
+    std::string rule;    // "= -0.09; must be > 0"
+};
+
+enum class EventKind : std::uint8_t {
+    lock, break_away, engage, release,       // friction pairs: closed, opened, free→slipping, slipping→free
+    mesh_sticks, mesh_releases, drive_side,  // gears: at rest under load, moving again, power reversed
+    tie_up, fall_back,                       // torque split not unique; more than K events in a step
+    engine_stalls, engine_starts,
+    facing_warning, facing_failure,
+};
+
+// Why a state changed ([Algin] eq. (12), (13)); margin = capacity − |torque| at the event.
+struct Event {
+    double time = 0;  // [s], inside the step
+    EventKind kind{};
+    std::int16_t device = -1;  // index into model.device_names(), −1: none
+    double torque = 0;         // [Nm] on the first link
+    double capacity = 0;       // [Nm] static capacity for lock/break_away; what the loss allows for a stuck mesh
+    double slip = 0;           // [rad/s]
+};
+
+// In words: `t=1.2034517 F2 locks: slip 0, torque 812.4 of 2569.3 Nm static`.
+class Model;
+std::string explain(const Model& model, const Event& event);
+
+// Proof of one step, as numbers.
+struct Certificate {
+    double torque_residual = 0;      // of eq. (15), relative to the torque scale
+    double constraint_violation = 0; // worst |C_Iᵀω| [rad/s]
+    double energy_defect = 0;        // ΔE − in + dissipated over this step [J]
+    std::int32_t events = 0;         // localised in this step
+    std::int32_t fall_backs = 0;     // next-step rule used
+    std::int32_t mode_lookups = 0;
+    std::int32_t mode_misses = 0;    // operators built in this step
+    std::int32_t flags = 0;          // bit 0: tie-up (split not unique); bit 1: direction search gave up; bit 2: not finite
+};
+
+enum class KernelKind { automatic, portable, avx2, avx512 };
+
+struct BuildOptions {
+    double step_size = 1e-3;  // h [s]
+    KernelKind kernel = KernelKind::automatic;
+};
+
+namespace detail { struct ModelData; struct OperatorsData; struct ScratchData; }
+
+class Model {
+  public:
+    // Throws ModelError.
+    static Model build(const Description& description, const BuildOptions& options = {});
+    Model(Model&&) noexcept;
+    Model& operator=(Model&&) noexcept;
+    ~Model();
+
+    double step_size() const noexcept;
+    std::string_view kernel() const noexcept;  // "portable", "avx2", "avx512"
+    std::string_view engine() const noexcept;  // "etd3", "ark3"
+    const Description& description() const noexcept;
+
+    const std::vector<Signal>& inputs() const noexcept;
+    const std::vector<Signal>& outputs() const noexcept;
+    int input(std::string_view name) const noexcept;   // index, or −1
+    int output(std::string_view name) const noexcept;  // index, or −1
+    const std::vector<std::string>& device_names() const noexcept;  // as Event::device counts them
+
+    std::size_t state_size() const noexcept;  // [bytes]
+    // Layout for tools: ω of mass i is state.speeds()[i] in description order.
+
+    const detail::ModelData& data() const noexcept { return *data_; }
+
+  private:
+    explicit Model(std::unique_ptr<detail::ModelData> data);
+    std::unique_ptr<detail::ModelData> data_;
+};
+
+struct Inputs {
+    explicit Inputs(const Model& model);  // every input at its Signal::initial
+    std::vector<double> value;            // by model.input(name); held over the step
+};
+
+struct Outputs {
+    static constexpr int event_capacity = 64;
+    explicit Outputs(const Model& model);
+    std::vector<double> value;  // by model.output(name), at the end of the step
+    Certificate certificate;
+    int event_count = 0;        // of this step; beyond the capacity they are only counted
+    std::array<Event, event_capacity> events;
+};
+
+class State {
+  public:
+    explicit State(const Model& model);  // the description's initial state, joined onto its locked devices
+    std::int64_t steps() const noexcept; // since start
+    double time() const noexcept;        // steps·h, never accumulated
+    std::span<const std::byte> bytes() const noexcept;
+    // False (and unchanged) if the size is not the model's.
+    bool restore(std::span<const std::byte> bytes) noexcept;
+
+    std::vector<double> block;  // layout in plant/state_layout.h
+};
+
+class Operators {
+  public:
+    explicit Operators(const Model& model);
+    ~Operators();
+    Operators(Operators&&) noexcept;
+    void drop() noexcept;  // forget every cached mode; the next step rebuilds, bit for bit
+    detail::OperatorsData& data() noexcept { return *data_; }
+
+  private:
+    std::unique_ptr<detail::OperatorsData> data_;
+};
+
+class Scratch {
+  public:
+    explicit Scratch(const Model& model);
+    ~Scratch();
+    Scratch(Scratch&&) noexcept;
+    void fill_with_nan() noexcept;  // for the test that nothing in it survives a step
+    detail::ScratchData& data() noexcept { return *data_; }
+
+  private:
+    std::unique_ptr<detail::ScratchData> data_;
+};
+
+// One step of model.step_size(). Never throws, allocates or blocks.
+void step(const Model& model, Operators& operators, State& state, const Inputs& inputs, Outputs& outputs,
+          Scratch& scratch) SHIFTRIG_REALTIME;
+
+// Fills `outputs.value` from the state as it is (before the first step).
+void observe(const Model& model, Operators& operators, const State& state, const Inputs& inputs,
+             Outputs& outputs, Scratch& scratch) SHIFTRIG_REALTIME;
+
+// A state in motion: the named devices locked, the given mass speeds taken, all others following through
+// locked devices, gears and (untwisted) shafts; actuators at rest at the values of `inputs`.
+struct Start {
+    std::vector<std::string> locked;
+    std::vector<std::pair<std::string, double>> speeds;
+};
+void start(const Model& model, State& state, const Start& start, const Inputs& inputs);
+
+}  // namespace shiftrig::plant
