@@ -1,0 +1,35 @@
+// shiftrig: a real-time transmission controller-in-the-loop simulator. The commands are in
+// *_command.cpp beside this file.
+#include <iostream>
+
+#include "apps/shiftrig/command.h"
+#include "io/input_error.h"
+
+int main(int argc, char** argv) {
+    using namespace shiftrig;
+
+    CLI::App app{"shiftrig: a bench on which shift-control software meets a tractor", "shiftrig"};
+    app.set_version_flag("--version", "shiftrig " SHIFTRIG_VERSION);
+    app.require_subcommand(0, 1);  // none is answered below, a wrong one by CLI11 with its name
+    app.footer("Exit codes: 0 good, 1 the check or test failed, 2 wrong usage or bad input.");
+
+    cli::Command::Run run;
+    for (const auto& command : cli::Command::all()) {
+        CLI::App* sub = app.add_subcommand(command.name, command.summary);
+        sub->parse_complete_callback([&run, body = command.declare(*sub)] { run = body; });
+    }
+
+    try {
+        app.parse(argc, argv);
+        if (run) return run();
+        std::cerr << app.help();
+        return cli::bad_input;
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? cli::good : cli::bad_input;
+    } catch (const io::InputError& error) {  // names its place itself
+        std::cerr << error.what() << '\n';
+    } catch (const std::exception& error) {
+        std::cerr << "shiftrig: " << error.what() << '\n';
+    }
+    return cli::bad_input;
+}
