@@ -1,0 +1,28 @@
+// Draft of a mouldboard plough, [D497]:
+//
+//     D = F_i (A + B S + C S²) W T
+//
+//   D         draft                        N, a capacity: it resists motion and holds at rest (friction device)
+//   F_i       soil factor                  1 (fine 1.0, medium 0.70, coarse 0.45)
+//   A, B, C   of the implement             N/(m cm), N h/(m cm km), N h²/(m cm km²)
+//   S         speed over ground            km/h
+//   W, T      working width, depth         m, cm
+//
+// Source: [D497]. Does not model: scatter of the soil (± 40 % in the field), weight transfer, entering and
+// leaving other than by the scale 0…1.
+#pragma once
+
+#include <cmath>
+
+#include "plant/description.h"
+
+namespace shiftrig::plant {
+
+// Draft capacity at body speed v [m/s], scaled by `share` 0 (out) … 1 (in the ground). [N], ≥ 0.
+inline double plough_draft(const Plough& p, double v, double share) noexcept {
+    const double kmh = 3.6 * std::fabs(v);
+    const double depth_cm = 100 * p.depth;
+    return share * p.soil_factor * (p.a + kmh * (p.b + kmh * p.c)) * p.width * depth_cm;
+}
+
+}  // namespace shiftrig::plant

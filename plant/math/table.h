@@ -1,0 +1,32 @@
+// Piecewise-linear table over rising abscissae; constant beyond its ends.
+#pragma once
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+namespace shiftrig::plant {
+
+using Table = std::vector<std::pair<double, double>>;  // (x, y), x strictly rising, at least one point
+
+inline double interpolate(const Table& table, double x) noexcept {
+    const std::size_t n = table.size();
+    if (!(x > table[0].first)) return table[0].second;
+    for (std::size_t i = 1; i < n; ++i) {
+        if (x < table[i].first) {
+            const auto [x0, y0] = table[i - 1];
+            const auto [x1, y1] = table[i];
+            return y0 + (y1 - y0) * ((x - x0) / (x1 - x0));
+        }
+    }
+    return table[n - 1].second;
+}
+
+inline double largest_value(const Table& table) noexcept {
+    double largest = table[0].second;
+    for (const auto& point : table)
+        if (point.second > largest) largest = point.second;
+    return largest;
+}
+
+}  // namespace shiftrig::plant
