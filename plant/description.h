@@ -58,6 +58,9 @@ struct DryFriction {
     // Sliding capacity falls with slip speed by the factor 1 − falling·(1 − e^(−|Δω|/falling_speed)).
     double falling = 0;        // [1], 0: Coulomb
     double falling_speed = 1;  // [rad/s]
+    // Instead of the exponential: sliding capacity as a factor of sliding_capacity over |Δω| ([rad/s], [1]),
+    // piecewise linear, its last slope continued (bearing friction that rises with speed).
+    std::vector<std::pair<double, double>> factor_over_slip;
 };
 
 // Wet multi-plate clutch: T = μ(v)·max(0, p − p_return)·A_piston·r_m·z, spec of the powershift clutch.
@@ -157,7 +160,10 @@ struct Gear {
     std::string name, a, b;
     double ratio = 0;           // [1], negative for an external pair drawn with its sign; not 0
     double efficiency = 1;      // (0, 1]
-    double bearing_torque = 0;  // ≥ 0 [Nm] friction on link a, load-independent
+    double bearing_torque = 0;  // ≥ 0 [Nm] load-independent friction behind the mesh, referred to link a
+    // The same two where b drives, if they differ: M_b = −u (M_a/η − bearing).
+    double backward_efficiency = 0;       // 0: as efficiency
+    double backward_bearing_torque = -1;  // negative: as bearing_torque
     // Selectable ratios (a range group): names and ratios; `ratio` is the one in use.
     std::vector<std::pair<std::string, double>> options;
 };

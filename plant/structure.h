@@ -1,0 +1,112 @@
+// The regular mechanical system behind a description: who joins whom, as the structural distribution
+// matrix (SDM) of [Algin]. Everything that solves for torques or speeds reads it: the step, the statics
+// and the modal view. Building it validates the description.
+//
+//   mass j:      J_j ω̇_j = M̃_j − Σ_k A_jk M_k                                             [Algin] eq. (14)
+//   device k:    one unknown M_k, the torque on its first link, positive from that mass into the device
+//   kinematics:  Σ_j A_jk ω_j is what the device sees: a slip speed, a twist rate, or 0 where it is rigid
+//
+//   | device                        | column of A                                   |
+//   | clutch, shaft, damper a–b     | a: 1, b: −1                                   |
+//   | brake, damper on a            | a: 1                                          |
+//   | wheel a on a road mass b      | a: 1, b: −1/r                                 |
+//   | gear, u = ω_a/ω_b             | a: 1, b: −u                                   |
+//   | planetary row, Willis' u      | sun: 1, ring: −u, carrier: −(1 − u)           |
+//
+// Losses change the distribution of torques, not the kinematics: the force column Â of a mesh is its
+// column with û = u·η^x in place of u ([Algin] eq. 16–25), x = +1 where the first link drives the mesh.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "plant/description.h"
+
+namespace shiftrig::plant {
+
+// One entry of an SDM column; mass −1 is the housing (its factor is then 0).
+struct Link {
+    int mass = -1;
+    double factor = 0;  // [1], or [1/m] towards a translating mass
+};
+
+// A pair that is locked, slips or is free. Besides the clutches of the description two kinds appear by
+// themselves, because what resists motion must also be able to hold a body at rest:
+enum class PairKind {
+    clutch,           // clutch, brake, Coulomb wheel contact: description.clutches[source]
+    rolling,          // rolling moment on a tyre's wheel: description.tyres[source]
+    body_resistance,  // motion resistance and draft on a translating mass: description.masses[source]
+};
+
+struct FrictionPair {
+    std::string name;
+    PairKind kind{};
+    int source = -1;
+    std::array<Link, 2> links;
+    double nominal_capacity = 0;  // [Nm] or [N], > 0; shares a torque that is not unique (tie-up)
+};
+
+// A gear or a planetary row: rigid, possibly with losses.
+struct Mesh {
+    std::string name;
+    bool planetary = false;
+    int source = -1;       // index into description.gears or .planetaries
+    int first = -1, second = -1, carrier = -1;  // masses; carrier −1: the housing
+    double ratio = 0;      // u
+    double forward_efficiency = 1, backward_efficiency = 1;  // first link drives / is driven
+    double forward_bearing = 0, backward_bearing = 0;        // [Nm] referred to the first link
+
+    bool lossy() const noexcept {
+        return forward_efficiency < 1 || backward_efficiency < 1 || forward_bearing > 0 || backward_bearing > 0;
+    }
+    // û for the loss exponent x = +1, −1, or 0 (no loss: at rest, or asked for ideally).
+    double force_ratio(int x) const noexcept {
+        return x > 0 ? ratio * forward_efficiency : x < 0 ? ratio / backward_efficiency : ratio;
+    }
+    // The column with the ratio u (kinematics) or any û (forces).
+    std::array<Link, 3> column(double u) const noexcept {
+        return {Link{first, 1}, Link{second, -u}, Link{carrier, carrier < 0 ? 0 : -(1 - u)}};
+    }
+    // What slips inside the mesh: ω_first − ω_carrier.
+    std::array<Link, 2> motion() const noexcept { return {Link{first, 1}, Link{carrier, carrier < 0 ? 0. : -1.}}; }
+};
+
+// A shaft or a damper: a known torque stiffness·twist + damping·(ω_a − ω_b).
+struct Elastic {
+    std::string name;
+    std::array<Link, 2> links;
+    double stiffness = 0, damping = 0;
+    int source = -1;  // index into description.shafts or .dampers
+};
+
+struct Structure {
+    std::vector<std::string> mass_names;
+    std::vector<double> inertia;  // [kg m²] or [kg]
+    std::vector<FrictionPair> pairs;
+    std::vector<Mesh> meshes;     // gears, then planetary rows, in description order
+    std::vector<Elastic> shafts;
+    std::vector<Elastic> dampers;
+
+    int masses() const noexcept { return static_cast<int>(inertia.size()); }
+    int mass(std::string_view name) const noexcept;  // index, or −1
+    int pair(std::string_view name) const noexcept;  // index, or −1
+    int mesh(std::string_view name) const noexcept;  // index, or −1
+
+    // SDM columns as dense matrices (masses × devices), for those who need no speed.
+    Eigen::MatrixXd pair_columns() const;
+    Eigen::MatrixXd mesh_columns() const;                             // A, with u
+    Eigen::MatrixXd mesh_force_columns(std::span<const int> x) const; // Â, with û by exponent x of each mesh
+    Eigen::MatrixXd shaft_columns() const;
+    Eigen::MatrixXd damper_columns() const;
+};
+
+// Validates the description and builds its structure. Throws ModelError: inertia or stiffness not
+// positive, ratio 0, efficiency outside (0, 1], names used twice, and above all the regularity rule,
+// "every link of every connector ends on a mass", naming the connectors that meet without one.
+Structure build_structure(const Description& description);
+
+}  // namespace shiftrig::plant
