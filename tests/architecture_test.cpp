@@ -56,7 +56,8 @@ TEST(Architecture, PlantKnowsNoClockThreadFileOrSocket) {
     const std::regex forbidden(
         R"(^(thread|mutex|chrono|atomic|fstream|iostream|filesystem|condition_variable|future|linux/|sys/|netinet/|lcm/|yaml-cpp/).*)");
     for (const auto& include : includes_of("plant"))
-        EXPECT_FALSE(std::regex_match(include.target, forbidden)) << include.file << " includes " << include.target;
+        EXPECT_FALSE(std::regex_match(include.target, forbidden))
+            << include.file << " includes " << include.target;
 }
 
 TEST(Architecture, PlantAndTimeDispatchNothingThroughVirtualFunctions) {
