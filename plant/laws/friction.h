@@ -3,8 +3,9 @@
 //     M_F = load · (base + rise · e^(−|Δω|/fade_speed)) · sign Δω          sliding
 //     M_T = load · static_factor                                           largest torque of a closed pair
 //
-//   dry     load = engagement · sliding_capacity, base = 1 − falling, rise = falling, static_factor = static_ratio
-//   wet     load = max(0, p − p_return) · A_piston · r_m · z, base + rise e^… = μ(v), static_factor = μ_static,
+//   dry     load = engagement · sliding_capacity, base = 1 − falling, rise = falling, static_factor =
+//   static_ratio wet     load = max(0, p − p_return) · A_piston · r_m · z, base + rise e^… = μ(v),
+//   static_factor = μ_static,
 //           r_m = 2/3 (ro³ − ri³)/(ro² − ri²)
 //
 //   M_F     sliding torque on the first link      Nm (N for a translating pair), sign of Δω
@@ -65,7 +66,8 @@ inline FrictionLaw friction_law(const WetPlates& p, double full_pressure = 0) no
     law.static_factor = p.mu_static;
     law.load_per_pascal = p.piston_area * radius * p.surfaces;
     law.return_pressure = p.return_pressure;
-    law.load_per_engagement = law.load_per_pascal * (full_pressure > p.return_pressure ? full_pressure - p.return_pressure : 0);
+    law.load_per_engagement =
+        law.load_per_pascal * (full_pressure > p.return_pressure ? full_pressure - p.return_pressure : 0);
     return law;
 }
 
@@ -88,6 +90,8 @@ inline double sliding_capacity(const FrictionLaw& law, double load, double slip)
     return load * sliding_factor(law, slip);
 }
 
-inline double static_capacity(const FrictionLaw& law, double load) noexcept { return load * law.static_factor; }
+inline double static_capacity(const FrictionLaw& law, double load) noexcept {
+    return load * law.static_factor;
+}
 
 }  // namespace shiftrig::plant

@@ -21,6 +21,8 @@ inline double grade_force(const Road& p, double grade, double gravity) noexcept 
     return -p.mass * gravity * (grade / std::sqrt(1 + grade * grade));
 }
 
-inline double air_force(const Road& p, double v) noexcept { return -p.air_coefficient * v * std::fabs(v); }
+inline double air_force(const Road& p, double v) noexcept {
+    return -p.air_coefficient * v * std::fabs(v);
+}
 
 }  // namespace shiftrig::plant

@@ -2,9 +2,9 @@
 //
 //     κ̇   = (ω r − v − V κ)/σ,   V = max(|ω r|, |v|)                     slip builds up over the length σ
 //     s   = κ + τ' κ̇,            τ' = τ σ/(σ + τ V)                      slip-rate damping, fading with speed
-//     F   = 0.88 (1 − e^(−0.1 Bn)) (1 − e^(−7.5 |s|)) W · sign s         torque F r on the wheel, force F on the body
-//     M_roll = 0.04 W r                                                  friction device on the wheel
-//     R   = (1/Bn + 0.5 |s|/√Bn) W                                       friction device on the body
+//     F   = 0.88 (1 − e^(−0.1 Bn)) (1 − e^(−7.5 |s|)) W · sign s         torque F r on the wheel, force F on
+//     the body M_roll = 0.04 W r                                                  friction device on the
+//     wheel R   = (1/Bn + 0.5 |s|/√Bn) W                                       friction device on the body
 //
 //   ω    wheel speed                        rad/s
 //   v    body speed                         m/s
@@ -14,10 +14,10 @@
 //   W    weight on the contact              N
 //   τ    slip-rate damping time             s: at standstill the relaxed tyre is an undamped spring
 //
-// With F/W + 0.04 = GT and GT − MR = F/W − R/W this is [Brixius]: GT = 0.88(1−e^(−0.1Bn))(1−e^(−7.5s)) + 0.04,
-// MR = 1/Bn + 0.04 + 0.5 s/√Bn; made odd in s. At speed the damping never leads beyond steady slip:
-// κ + τ'κ̇ = κ + w (κ_steady − κ), w = τV/(σ + τV) < 1.
-// Does not model: side force, weight transfer, multi-pass soil compaction, tyre carcass inertia.
+// With F/W + 0.04 = GT and GT − MR = F/W − R/W this is [Brixius]: GT = 0.88(1−e^(−0.1Bn))(1−e^(−7.5s)) +
+// 0.04, MR = 1/Bn + 0.04 + 0.5 s/√Bn; made odd in s. At speed the damping never leads beyond steady slip: κ +
+// τ'κ̇ = κ + w (κ_steady − κ), w = τV/(σ + τV) < 1. Does not model: side force, weight transfer, multi-pass
+// soil compaction, tyre carcass inertia.
 #pragma once
 
 #include <cmath>
@@ -39,7 +39,8 @@ inline TyreSoil tyre_soil(const BrixiusTyre& p, double mobility_number) noexcept
             0.5 * p.weight / std::sqrt(mobility_number)};
 }
 
-inline double tyre_slip_rate(const BrixiusTyre& p, double kappa, double wheel_speed, double body_speed) noexcept {
+inline double tyre_slip_rate(const BrixiusTyre& p, double kappa, double wheel_speed,
+                             double body_speed) noexcept {
     const double rim = wheel_speed * p.radius;
     const double rolling = std::fmax(std::fabs(rim), std::fabs(body_speed));
     return (rim - body_speed - rolling * kappa) / p.relaxation_length;
@@ -49,8 +50,8 @@ inline double tyre_slip_rate(const BrixiusTyre& p, double kappa, double wheel_sp
 inline double tyre_slip(const BrixiusTyre& p, double kappa, double kappa_rate, double wheel_speed,
                         double body_speed) noexcept {
     const double rolling = std::fmax(std::fabs(wheel_speed * p.radius), std::fabs(body_speed));
-    const double damping = p.slip_damping_time * p.relaxation_length /
-                           (p.relaxation_length + p.slip_damping_time * rolling);
+    const double damping =
+        p.slip_damping_time * p.relaxation_length / (p.relaxation_length + p.slip_damping_time * rolling);
     return kappa + damping * kappa_rate;
 }
 
@@ -60,12 +61,16 @@ inline double tyre_force(const TyreSoil& soil, double slip) noexcept {
 }
 
 // dF/ds at s = 0 [N].
-inline double tyre_force_slope(const TyreSoil& soil) noexcept { return 7.5 * soil.grip; }
+inline double tyre_force_slope(const TyreSoil& soil) noexcept {
+    return 7.5 * soil.grip;
+}
 
 // Capacity of the resistance on the body [N], of the rolling moment on the wheel [Nm].
 inline double tyre_resistance(const TyreSoil& soil, double slip) noexcept {
     return soil.resistance + soil.resistance_per_slip * std::fabs(slip);
 }
-inline double rolling_moment(const BrixiusTyre& p) noexcept { return p.rolling_coefficient * p.weight * p.radius; }
+inline double rolling_moment(const BrixiusTyre& p) noexcept {
+    return p.rolling_coefficient * p.weight * p.radius;
+}
 
 }  // namespace shiftrig::plant

@@ -48,7 +48,8 @@ inline double exp(double x) noexcept {
     const double r2 = r * r, r4 = r2 * r2;
     const double p0 = (1.0 / 2 + r * (1.0 / 6)) + r2 * (1.0 / 24 + r * (1.0 / 120));
     const double p1 = (1.0 / 720 + r * (1.0 / 5040)) + r2 * (1.0 / 40320 + r * (1.0 / 362880));
-    const double p2 = (1.0 / 3628800 + r * (1.0 / 39916800)) + r2 * (1.0 / 479001600 + r * (1.0 / 6227020800.0));
+    const double p2 =
+        (1.0 / 3628800 + r * (1.0 / 39916800)) + r2 * (1.0 / 479001600 + r * (1.0 / 6227020800.0));
     const double p = p0 + r4 * (p1 + r4 * p2);
     const double e = 1 + (high - (low - r2 * p));
     const auto n = static_cast<std::int64_t>(k);
@@ -59,7 +60,8 @@ inline double exp(double x) noexcept {
 
 // log(0) = −∞, log of a negative number = NaN.
 inline double log(double x) noexcept {
-    if (!(x > 0)) return x == 0 ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
+    if (!(x > 0))
+        return x == 0 ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
     if (x == std::numeric_limits<double>::infinity()) return x;
     double k = 0;
     if (x < 0x1p-1022) {
@@ -86,25 +88,29 @@ inline double log(double x) noexcept {
                        z * (2.0 / 9 +
                             z * (2.0 / 11 +
                                  z * (2.0 / 13 +
-                                      z * (2.0 / 15 + z * (2.0 / 17 + z * (2.0 / 19 + z * (2.0 / 21 + z * (2.0 / 23)))))))))));
+                                      z * (2.0 / 15 +
+                                           z * (2.0 / 17 +
+                                                z * (2.0 / 19 + z * (2.0 / 21 + z * (2.0 / 23)))))))))));
     // 2 artanh s = f − f²/2 + s (f²/2 + rest): the large term f is exact.
     const double half_square = 0.5 * f * f;
     return k * ln2_high + (f - (half_square - (s * (half_square + rest) + k * ln2_low)));
 }
 
 // x^y for x > 0.
-inline double power(double x, double y) noexcept { return exp(y * log(x)); }
+inline double power(double x, double y) noexcept {
+    return exp(y * log(x));
+}
 
 namespace detail {
 
 struct QuarterTurns {
-    double r;       // |r| ≤ π/4 (and a little)
-    double tail;    // what rounding r lost
-    std::int64_t k; // x = k π/2 + r + tail
+    double r;        // |r| ≤ π/4 (and a little)
+    double tail;     // what rounding r lost
+    std::int64_t k;  // x = k π/2 + r + tail
 };
 
 inline QuarterTurns quarter_turns(double x) noexcept {
-    constexpr double part1 = 0x1.921fb544p0;              // π/2 in three parts of 33, 33 and 53 bits
+    constexpr double part1 = 0x1.921fb544p0;  // π/2 in three parts of 33, 33 and 53 bits
     constexpr double part2 = 0x1.0b4611a6p-34;
     constexpr double part3 = 0x1.3198a2e037073p-69;
     const double k = nearest(x * 0x1.45f306dc9c883p-1);
@@ -123,9 +129,9 @@ inline double sine_polynomial(double r, double tail) noexcept {
         -1.0 / 6 +
         z * (1.0 / 120 +
              z * (-1.0 / 5040 +
-                  z * (1.0 / 362880 +
-                       z * (-1.0 / 39916800 +
-                            z * (1.0 / 6227020800.0 + z * (-1.0 / 1307674368000.0 + z * (1.0 / 355687428096000.0)))))));
+                  z * (1.0 / 362880 + z * (-1.0 / 39916800 +
+                                           z * (1.0 / 6227020800.0 + z * (-1.0 / 1307674368000.0 +
+                                                                          z * (1.0 / 355687428096000.0)))))));
     return r + (tail * (1 - 0.5 * z) + r * z * p);
 }
 
@@ -135,7 +141,8 @@ inline double cosine_polynomial(double r, double tail) noexcept {
         1.0 / 24 +
         z * (-1.0 / 720 +
              z * (1.0 / 40320 +
-                  z * (-1.0 / 3628800 + z * (1.0 / 479001600.0 + z * (-1.0 / 87178291200.0 + z * (1.0 / 20922789888000.0))))));
+                  z * (-1.0 / 3628800 +
+                       z * (1.0 / 479001600.0 + z * (-1.0 / 87178291200.0 + z * (1.0 / 20922789888000.0))))));
     const double h = 0.5 * z;
     const double w = 1 - h;
     return w + (((1 - w) - h) + (z * z * p - r * tail));
@@ -146,14 +153,16 @@ inline double cosine_polynomial(double r, double tail) noexcept {
 inline double sin(double x) noexcept {
     if (!(std::fabs(x) < 1e15)) return std::numeric_limits<double>::quiet_NaN();
     const detail::QuarterTurns q = detail::quarter_turns(x);
-    const double value = (q.k & 1) ? detail::cosine_polynomial(q.r, q.tail) : detail::sine_polynomial(q.r, q.tail);
+    const double value =
+        (q.k & 1) ? detail::cosine_polynomial(q.r, q.tail) : detail::sine_polynomial(q.r, q.tail);
     return (q.k & 2) ? -value : value;
 }
 
 inline double cos(double x) noexcept {
     if (!(std::fabs(x) < 1e15)) return std::numeric_limits<double>::quiet_NaN();
     const detail::QuarterTurns q = detail::quarter_turns(x);
-    const double value = (q.k & 1) ? detail::sine_polynomial(q.r, q.tail) : detail::cosine_polynomial(q.r, q.tail);
+    const double value =
+        (q.k & 1) ? detail::sine_polynomial(q.r, q.tail) : detail::cosine_polynomial(q.r, q.tail);
     return ((q.k + 1) & 2) ? -value : value;
 }
 

@@ -1,0 +1,128 @@
+// Diesel engine on the crankshaft mass: net full-load curve, governor, fuel actuator, turbocharger.
+//
+//     no-load speed   n0 = low_idle + throttle (high_idle − low_idle), or the TSC1 speed request
+//     full load       T_full(ω): table; below fade_from falling linearly to 0 at fade_to
+//     available       T_av = T_full (φ + (1 − φ) b)
+//     demand          T_d = slope (n0 − ω), limited to −T_friction(ω) … min(T_av, limit · max T_full);
+//     −T_friction when the
+//                     fuel is cut
+//     actuator        lag_a · Ṫ = T_d − T
+//     turbo           lag_t · ḃ = max(T, 0)/T_full − b, limited to 0…1
+//     friction        T_friction = constant + per_speed · |ω|
+//
+//   T     net torque on the crankshaft (state)    Nm, positive drives
+//   b     boost, share of what the turbo adds (state)   1
+//   φ     share of T_full available without boost       1
+//   ω     crankshaft speed                        rad/s
+//   limit TSC1 torque limit                       1, of the peak of T_full
+//
+// The curve is net: friction shows only where the governor closes the rack beyond zero (overrun, fuel cut),
+// along the governor's own line. Below stall_speed the engine has stalled: its torque is 0 and its friction
+// becomes a friction device on the crankshaft (capacity T_friction), so that it resists either way and holds
+// at rest. A start event cranks it with half of the torque at fade_from [estimate] up to fade_from, or for at
+// most 3 s. Source: usual mean-value model; parameters of the reference tractor in docs/mechanics.md. Does
+// not model: cylinder-by-cylinder torque, smoke limit beyond φ, engine brake, temperature.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+#include "plant/description.h"
+#include "plant/math/table.h"
+
+namespace shiftrig::plant {
+
+struct EngineInput {
+    double throttle = 0;  // 0…1
+    bool speed_request_enable = false;
+    double speed_request = 0;  // [rad/s]
+    double torque_limit = 1;   // [1]
+    bool fuel_cut = false;
+};
+
+// The differential states; not stiff, integrated with the step's stages.
+struct EngineState {
+    double torque = 0;  // [Nm]
+    double boost = 0;   // 0…1
+};
+
+enum class EngineMode { running, stalled, cranking };
+
+inline double full_load(const Engine& p, double speed) noexcept {
+    if (speed >= p.fade_from) return interpolate(p.full_load, speed);
+    if (speed <= p.fade_to) return 0;
+    return interpolate(p.full_load, p.fade_from) * ((speed - p.fade_to) / (p.fade_from - p.fade_to));
+}
+
+inline double engine_friction(const Engine& p, double speed) noexcept {
+    return p.friction_constant + p.friction_per_speed * std::fabs(speed);
+}
+
+inline double no_load_speed(const Engine& p, const EngineInput& input) noexcept {
+    if (input.speed_request_enable) return input.speed_request;
+    return p.low_idle + input.throttle * (p.high_idle - p.low_idle);
+}
+
+// `peak` = largest_value(p.full_load), kept by the caller.
+inline double torque_demand(const Engine& p, double peak, const EngineInput& input, double speed, double full,
+                            double boost) noexcept {
+    const double friction = engine_friction(p, speed);
+    if (input.fuel_cut) return -friction;
+    const double share =
+        p.turbo_lag > 0 ? p.turbo_instant_fraction + (1 - p.turbo_instant_fraction) * boost : 1;
+    const double upper = std::fmin(full * share, input.torque_limit * peak);
+    const double wanted = p.governor_slope * (no_load_speed(p, input) - speed);
+    return wanted < -friction ? -friction : wanted > upper ? upper : wanted;
+}
+
+// Derivatives while running; a lag of 0 gives 0 (engine_torque then takes the demand itself).
+inline EngineState engine_rate(const Engine& p, double peak, const EngineInput& input,
+                               const EngineState& state, double speed) noexcept {
+    const double full = full_load(p, speed);
+    EngineState rate;
+    if (p.actuator_lag > 0)
+        rate.torque =
+            (torque_demand(p, peak, input, speed, full, state.boost) - state.torque) / p.actuator_lag;
+    if (p.turbo_lag > 0) {
+        const double load = full > 0 && state.torque > 0 ? std::fmin(state.torque / full, 1) : 0;
+        rate.boost = (load - state.boost) / p.turbo_lag;
+    }
+    return rate;
+}
+
+inline double starter_torque(const Engine& p) noexcept {
+    return 0.5 * interpolate(p.full_load, p.fade_from);
+}
+
+// Torque of the engine on its mass, without the friction device of the stalled one.
+inline double engine_torque(const Engine& p, double peak, const EngineInput& input, const EngineState& state,
+                            EngineMode mode, double speed) noexcept {
+    if (mode == EngineMode::stalled) return 0;
+    if (mode == EngineMode::cranking) return starter_torque(p);
+    if (p.actuator_lag > 0) return state.torque;
+    return torque_demand(p, peak, input, speed, full_load(p, speed), state.boost);
+}
+
+inline double stalled_friction_capacity(const Engine& p, EngineMode mode, double speed) noexcept {
+    return mode == EngineMode::stalled ? engine_friction(p, speed) : 0;
+}
+
+// Mode for the next step, decided at the end of this one. `crank_time` [s] counts in cranking.
+inline EngineMode next_engine_mode(const Engine& p, EngineMode mode, double speed, bool start_edge, double h,
+                                   double& crank_time) noexcept {
+    constexpr double longest_cranking = 3;  // [s]
+    switch (mode) {
+        case EngineMode::running:
+            return speed < p.stall_speed ? EngineMode::stalled : EngineMode::running;
+        case EngineMode::stalled:
+            crank_time = 0;
+            return start_edge ? EngineMode::cranking : EngineMode::stalled;
+        case EngineMode::cranking:
+            crank_time += h;
+            if (speed >= p.fade_from) return EngineMode::running;
+            return crank_time < longest_cranking ? EngineMode::cranking : EngineMode::stalled;
+    }
+    return mode;
+}
+
+}  // namespace shiftrig::plant

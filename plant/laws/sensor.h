@@ -1,0 +1,104 @@
+// Speed pick-up on a toothed wheel, measuring the period between teeth, with its faults.
+//
+//     speed = m (2π/teeth) / Δt      m teeth seen since the last one of the previous reading, Δt between both
+//     without a tooth the reading falls as (2π/teeth)/(time since the last one); below drop_out_speed it is 0
+//
+//   speed           what the controller gets              rad/s; unsigned unless the pick-up is directional
+//   missing_teeth   that many teeth of each turn give no edge (fault)
+//
+// Order of faults: stuck holds the last output; otherwise + bias + noise; drop-out reads 0. The noise is a
+// pure function of (seed, sensor, step), so that a replay gives the same bits. Source: usual period
+// measurement (J1939 transmission ECUs). Does not model: tooth pitch errors, the pick-up's amplitude, timer
+// resolution.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "plant/description.h"
+#include "plant/math/elementary.h"
+
+namespace shiftrig::plant {
+
+struct SensorState {
+    double position = 0;      // of the wheel [teeth], 0 … teeth
+    double since_edge = 1e9;  // time since the last tooth seen [s]
+    double reading = 0;       // speed by the period [rad/s], signed only where directional
+    double output = 0;        // after faults [rad/s]
+};
+
+struct SensorFaults {
+    double bias = 0;   // [rad/s]
+    double noise = 0;  // 1σ [rad/s]
+    bool stuck = false;
+    bool dropout = false;
+    int missing_teeth = 0;  // per turn
+};
+
+namespace detail {
+
+inline std::uint64_t mix(std::uint64_t x) noexcept {  // splitmix64 finaliser
+    x ^= x >> 30;
+    x *= 0xbf58476d1ce4e5b9ull;
+    x ^= x >> 27;
+    x *= 0x94d049bb133111ebull;
+    return x ^ (x >> 31);
+}
+
+}  // namespace detail
+
+// Normal deviate (mean 0, σ 1) of a seed, a stream and a count, by Box and Muller.
+inline double noise(std::uint64_t seed, std::uint64_t stream, std::uint64_t count) noexcept {
+    const std::uint64_t key = detail::mix(seed + 0x9e3779b97f4a7c15ull * (stream + 1));
+    const std::uint64_t a = detail::mix(key + 0x9e3779b97f4a7c15ull * (2 * count + 1));
+    const std::uint64_t b = detail::mix(key + 0x9e3779b97f4a7c15ull * (2 * count + 2));
+    const double u = (static_cast<double>(a >> 11) + 0.5) * 0x1p-53;  // (0, 1)
+    const double v = static_cast<double>(b >> 11) * 0x1p-53;
+    return std::sqrt(-2 * log(u)) * cos(2 * pi * v);
+}
+
+// The pick-up over one step, with the wheel's speed at its start and end.
+inline void advance_pickup(const SpeedSensor& p, SensorState& state, double begin, double end, double h,
+                           int missing_teeth = 0) noexcept {
+    if (p.ideal || p.teeth <= 0) {
+        state.reading = end;
+        return;
+    }
+    const double teeth = p.teeth;
+    const double pitch = 2 * pi / teeth;
+    const double travel = 0.5 * (begin + end) * h / pitch;  // [teeth]
+    const double from = state.position, to = from + travel;
+    const bool forward = travel >= 0;
+    const auto first = static_cast<std::int64_t>(forward ? std::floor(from) + 1 : std::ceil(from) - 1);
+    const auto last = static_cast<std::int64_t>(forward ? std::floor(to) : std::ceil(to));
+    const std::int64_t count = forward ? last - first + 1 : first - last + 1;
+    int seen = 0;
+    double last_time = 0;
+    for (std::int64_t i = 0; i < count && i < 1000; ++i) {
+        const std::int64_t edge = forward ? first + i : first - i;
+        const std::int64_t tooth = ((edge % p.teeth) + p.teeth) % p.teeth;
+        if (tooth < missing_teeth) continue;
+        ++seen;
+        last_time = h * ((static_cast<double>(edge) - from) / travel);
+    }
+    if (seen > 0) {
+        const double speed = seen * pitch / (state.since_edge + last_time);
+        state.reading = p.directional && !forward ? -speed : speed;
+        state.since_edge = h - last_time;
+    } else {
+        state.since_edge += h;
+        const double limit = pitch / state.since_edge;
+        if (std::fabs(state.reading) > limit) state.reading = state.reading < 0 ? -limit : limit;
+    }
+    if (std::fabs(state.reading) < p.drop_out_speed) state.reading = 0;
+    state.position = to - teeth * std::floor(to / teeth);
+}
+
+// Faults on top of the reading; returns (and keeps) the output. `deviate` is noise(…) or 0.
+inline double sensor_output(SensorState& state, const SensorFaults& faults, double deviate) noexcept {
+    if (!faults.stuck) state.output = state.reading + faults.bias + faults.noise * deviate;
+    if (faults.dropout) return 0;
+    return state.output;
+}
+
+}  // namespace shiftrig::plant
