@@ -1,0 +1,44 @@
+// A run in memory: one column per signal, one row per tick, and what changed its state. Recordings are loaded into
+// it, the rig fills it directly where nothing is written to disk; every judgement of a run starts from here.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "plant/plant.h"
+#include "plant/signal.h"
+
+namespace shiftrig::analysis {
+
+struct Column {
+    plant::Signal signal;       // name and unit
+    std::vector<double> value;  // one per tick, in signal.unit
+};
+
+struct Change {
+    plant::Event event;
+    std::string device;  // "F2"; empty: the rig's own
+    std::string text;    // plant::explain(), or the rig's words
+};
+
+struct Run {
+    std::vector<double> time;  // [s], rising, one per tick
+    std::vector<Column> columns;
+    std::vector<Change> changes;
+    plant::Description machine;
+
+    // Identity for reports: "scenario" → "plough_upshift", "kernel" → "avx2", "build" → …
+    std::vector<std::pair<std::string, std::string>> identity;
+    std::string model_text;
+
+    // nullptr if the run has no such signal.
+    const std::vector<double>* column(std::string_view name) const noexcept {
+        for (const auto& candidate : columns)
+            if (candidate.signal.name == name) return &candidate.value;
+        return nullptr;
+    }
+};
+
+}  // namespace shiftrig::analysis
