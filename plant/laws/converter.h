@@ -10,9 +10,10 @@
 //   K     capacity factor ω_p/√T_p of the pump                    rad/s/√Nm
 //   R     torque ratio                                            1
 //
-// g carries the torque through zero at synchronous speed: published K tables end there with a finite value,
-// which as it stands would jump in sign. Source: usual K-factor model (SAE J643 notation). Does not model:
-// fluid inertia, heating of the converter's oil, a different curve in overrun.
+// g carries the torque through zero at synchronous speed: published K tables end there with a finite
+// value, which as it stands would jump in sign.
+// Source: usual K-factor model (SAE J643 notation).
+// Does not model: fluid inertia, heating of the converter's oil, a different curve in overrun.
 #pragma once
 
 #include <cmath>

@@ -4,8 +4,7 @@
 //     full load       T_full(ω): table; below fade_from falling linearly to 0 at fade_to
 //     available       T_av = T_full (φ + (1 − φ) b)
 //     demand          T_d = slope (n0 − ω), limited to −T_friction(ω) … min(T_av, limit · max T_full);
-//     −T_friction when the
-//                     fuel is cut
+//                     −T_friction when the fuel is cut
 //     actuator        lag_a · Ṫ = T_d − T
 //     turbo           lag_t · ḃ = max(T, 0)/T_full − b, limited to 0…1
 //     friction        T_friction = constant + per_speed · |ω|
@@ -16,12 +15,13 @@
 //   ω     crankshaft speed                        rad/s
 //   limit TSC1 torque limit                       1, of the peak of T_full
 //
-// The curve is net: friction shows only where the governor closes the rack beyond zero (overrun, fuel cut),
-// along the governor's own line. Below stall_speed the engine has stalled: its torque is 0 and its friction
-// becomes a friction device on the crankshaft (capacity T_friction), so that it resists either way and holds
-// at rest. A start event cranks it with half of the torque at fade_from [estimate] up to fade_from, or for at
-// most 3 s. Source: usual mean-value model; parameters of the reference tractor in docs/mechanics.md. Does
-// not model: cylinder-by-cylinder torque, smoke limit beyond φ, engine brake, temperature.
+// The curve is net: friction shows only where the governor closes the rack beyond zero (overrun, fuel
+// cut), along the governor's own line. Below stall_speed the engine has stalled: its torque is 0 and its
+// friction becomes a friction device on the crankshaft (capacity T_friction), so that it resists either
+// way and holds at rest. A start event cranks it with half of the torque at fade_from [estimate] up to
+// fade_from, or for at most 3 s.
+// Source: usual mean-value model; parameters of the reference tractor in docs/mechanics.md.
+// Does not model: cylinder-by-cylinder torque, smoke limit beyond φ, engine brake, temperature.
 #pragma once
 
 #include <cmath>

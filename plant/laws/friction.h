@@ -3,9 +3,8 @@
 //     M_F = load · (base + rise · e^(−|Δω|/fade_speed)) · sign Δω          sliding
 //     M_T = load · static_factor                                           largest torque of a closed pair
 //
-//   dry     load = engagement · sliding_capacity, base = 1 − falling, rise = falling, static_factor =
-//   static_ratio wet     load = max(0, p − p_return) · A_piston · r_m · z, base + rise e^… = μ(v),
-//   static_factor = μ_static,
+//   dry     load = engagement · sliding_capacity, base = 1 − falling, rise = falling, static_factor = static_ratio
+//   wet     load = max(0, p − p_return) · A_piston · r_m · z, base + rise e^… = μ(v), static_factor = μ_static,
 //           r_m = 2/3 (ro³ − ri³)/(ro² − ri²)
 //
 //   M_F     sliding torque on the first link      Nm (N for a translating pair), sign of Δω

@@ -10,8 +10,9 @@
 //   G_sb, G_bo        conductances                     W/K
 //
 // Advanced exactly for constant P and T_oil: y = T − T_oil, y₁ = E y₀ + F P with E = e^(Ah), F = h φ₁(Ah)
-// (1/C_s, 0). Source: two-node lumped model; figures are estimates. Does not model: distribution over the
-// plates, radial hot spots.
+// (1/C_s, 0).
+// Source: two-node lumped model; figures are estimates.
+// Does not model: distribution over the plates, radial hot spots.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// Hydraulic actuation of a wet clutch: command → dead time → slew limit → second-order valve → piston →
-// chamber.
+// Hydraulic actuation of a wet clutch: command → dead time → slew limit → second-order valve → piston,
+// chamber pressure.
 //
 //     dead time   u_d(t) = u(t − d): commands are held over steps, so u_d changes at most once inside a step
 //     slew        ṙ = ± slew towards u_d
@@ -13,16 +13,16 @@
 //   p, ṗ  valve outlet pressure (states)            Pa, Pa/s
 //   x     piston stroke (state)                     m; capacity begins at full stroke, the kiss point
 //   p_c   chamber pressure                          Pa: what presses the plates above p_return
-//   Q     flow into the piston                      m³/s: fill_flow by the oil's viscosity and the share of
-//   the pump V     fill volume                               m³
+//   Q     flow into the piston                      m³/s: fill_flow by oil viscosity and share of the pump
+//   V     fill volume                               m³
 //
 // r is linear between the few instants at which the target changes or is reached, and over such a piece the
 // valve is advanced exactly (particular solution r − 2ζṙ/ω, homogeneous part by its exponential): p is exact
 // at the middle and the end of the step, whatever h. The chamber pressure jumps where the piston arrives at
 // full stroke with p > p_return; HydraulicStep says when, so that the engine can split its step there. All
-// else is continuous, p with two derivatives. Source: usual electro-hydraulic clutch model; figures are
-// estimates (docs/mechanics.md). Does not model: flow forces, leakage, compressibility, a faster or slower
-// emptying than filling.
+// else is continuous, p with two derivatives.
+// Source: usual electro-hydraulic clutch model; figures are estimates (docs/mechanics.md).
+// Does not model: flow forces, leakage, compressibility, a faster or slower emptying than filling.
 #pragma once
 
 #include <cmath>

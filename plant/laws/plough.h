@@ -2,10 +2,11 @@
 //
 //     D = F_i (A + B S + C S²) W T
 //
-//   D         draft                        N, a capacity: it resists motion and holds at rest (friction
-//   device) F_i       soil factor                  1 (fine 1.0, medium 0.70, coarse 0.45) A, B, C   of the
-//   implement             N/(m cm), N h/(m cm km), N h²/(m cm km²) S         speed over ground km/h W, T
-//   working width, depth         m, cm
+//   D         draft                        N, a capacity: it resists motion and holds at rest (friction device)
+//   F_i       soil factor                  1 (fine 1.0, medium 0.70, coarse 0.45)
+//   A, B, C   of the implement             N/(m cm), N h/(m cm km), N h²/(m cm km²)
+//   S         speed over ground            km/h
+//   W, T      working width, depth         m, cm
 //
 // Source: [D497]. Does not model: scatter of the soil (± 40 % in the field), weight transfer, entering and
 // leaving other than by the scale 0…1.

@@ -7,9 +7,9 @@
 //   missing_teeth   that many teeth of each turn give no edge (fault)
 //
 // Order of faults: stuck holds the last output; otherwise + bias + noise; drop-out reads 0. The noise is a
-// pure function of (seed, sensor, step), so that a replay gives the same bits. Source: usual period
-// measurement (J1939 transmission ECUs). Does not model: tooth pitch errors, the pick-up's amplitude, timer
-// resolution.
+// pure function of (seed, sensor, step), so that a replay gives the same bits.
+// Source: usual period measurement (J1939 transmission ECUs).
+// Does not model: tooth pitch errors, the pick-up's amplitude, timer resolution.
 #pragma once
 
 #include <cmath>

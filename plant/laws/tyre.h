@@ -1,10 +1,10 @@
 // Driven tyre on soil: Brixius traction with a relaxation length.
 //
-//     κ̇   = (ω r − v − V κ)/σ,   V = max(|ω r|, |v|)                     slip builds up over the length σ
-//     s   = κ + τ' κ̇,            τ' = τ σ/(σ + τ V)                      slip-rate damping, fading with speed
-//     F   = 0.88 (1 − e^(−0.1 Bn)) (1 − e^(−7.5 |s|)) W · sign s         torque F r on the wheel, force F on
-//     the body M_roll = 0.04 W r                                                  friction device on the
-//     wheel R   = (1/Bn + 0.5 |s|/√Bn) W                                       friction device on the body
+//     κ̇   = (ω r − v − V κ)/σ,   V = max(|ω r|, |v|)       builds up over the length σ
+//     s   = κ + τ' κ̇,            τ' = τ σ/(σ + τ V)             slip-rate damping, fading with speed
+//     F   = 0.88 (1 − e^(−0.1 Bn)) (1 − e^(−7.5 |s|)) W · sign s   on the body; F r on the wheel
+//     M_roll = 0.04 W r                                                  friction device on the wheel
+//     R   = (1/Bn + 0.5 |s|/√Bn) W                                       friction device on the body
 //
 //   ω    wheel speed                        rad/s
 //   v    body speed                         m/s
@@ -14,10 +14,10 @@
 //   W    weight on the contact              N
 //   τ    slip-rate damping time             s: at standstill the relaxed tyre is an undamped spring
 //
-// With F/W + 0.04 = GT and GT − MR = F/W − R/W this is [Brixius]: GT = 0.88(1−e^(−0.1Bn))(1−e^(−7.5s)) +
-// 0.04, MR = 1/Bn + 0.04 + 0.5 s/√Bn; made odd in s. At speed the damping never leads beyond steady slip: κ +
-// τ'κ̇ = κ + w (κ_steady − κ), w = τV/(σ + τV) < 1. Does not model: side force, weight transfer, multi-pass
-// soil compaction, tyre carcass inertia.
+// With F/W + 0.04 = GT and GT − MR = F/W − R/W this is [Brixius]: GT = 0.88(1−e^(−0.1Bn))(1−e^(−7.5s)) + 0.04,
+// MR = 1/Bn + 0.04 + 0.5 s/√Bn; made odd in s. At speed the damping never leads beyond steady slip:
+// κ + τ'κ̇ = κ + w (κ_steady − κ), w = τV/(σ + τV) < 1.
+// Does not model: side force, weight transfer, multi-pass soil compaction, tyre carcass inertia.
 #pragma once
 
 #include <cmath>
