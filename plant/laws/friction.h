@@ -4,6 +4,7 @@
 //     M_T = load · static_factor                                           largest torque of a closed pair
 //
 //   dry     load = engagement · sliding_capacity, base = 1 − falling, rise = falling, static_factor = static_ratio
+//           or, with factor_over_slip f, M_F = load · f(|Δω|), M_T = load · static_ratio · f(0)
 //   wet     load = max(0, p − p_return) · A_piston · r_m · z, base + rise e^… = μ(v), static_factor = μ_static,
 //           r_m = 2/3 (ro³ − ri³)/(ro² − ri²)
 //
@@ -25,6 +26,7 @@
 
 #include "plant/description.h"
 #include "plant/math/elementary.h"
+#include "plant/math/table.h"
 
 namespace shiftrig::plant {
 
@@ -37,6 +39,8 @@ struct FrictionLaw {
     double load_per_engagement = 0;  // [Nm]
     double load_per_pascal = 0;      // [Nm/Pa]
     double return_pressure = 0;      // [Pa]
+    // factor_over_slip of the description, if it has one: the law keeps a view, the description must outlive it.
+    const Table* factor_over_slip = nullptr;
 };
 
 inline double mean_radius(const WetPlates& p) noexcept {
@@ -50,6 +54,10 @@ inline FrictionLaw friction_law(const DryFriction& p) noexcept {
     law.rise = p.falling;
     law.inverse_speed = 1 / p.falling_speed;
     law.static_factor = p.static_ratio;
+    if (!p.factor_over_slip.empty()) {
+        law.factor_over_slip = &p.factor_over_slip;
+        law.static_factor *= interpolate(p.factor_over_slip, 0);
+    }
     law.load_per_engagement = p.sliding_capacity;
     return law;
 }
@@ -81,6 +89,7 @@ inline double load_from_engagement(const FrictionLaw& law, double engagement) no
 
 // Friction factor of the sliding pair at this slip; times load = sliding capacity.
 inline double sliding_factor(const FrictionLaw& law, double slip) noexcept {
+    if (law.factor_over_slip != nullptr) return extrapolate(*law.factor_over_slip, std::fabs(slip));
     if (law.rise == 0) return law.base;
     return law.base + law.rise * exp(-std::fabs(slip) * law.inverse_speed);
 }

@@ -22,6 +22,15 @@ inline double interpolate(const Table& table, double x) noexcept {
     return table[n - 1].second;
 }
 
+// The same, with the last slope continued beyond the last point.
+inline double extrapolate(const Table& table, double x) noexcept {
+    const std::size_t n = table.size();
+    if (n < 2 || !(x > table[n - 1].first)) return interpolate(table, x);
+    const auto [x0, y0] = table[n - 2];
+    const auto [x1, y1] = table[n - 1];
+    return y1 + (y1 - y0) * ((x - x1) / (x1 - x0));
+}
+
 inline double largest_value(const Table& table) noexcept {
     double largest = table[0].second;
     for (const auto& point : table)
