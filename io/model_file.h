@@ -65,6 +65,6 @@ plant::Model build_model(const ModelFile& file, const plant::BuildOptions& optio
 void select_option(plant::Description& description, const std::string& gear, const std::string& option);
 
 // JSON Schema (draft 7) of a model file, made from the same field lists that read it.
-nlohmann::json model_schema();
+nlohmann::ordered_json model_schema();
 
 }  // namespace shiftrig::io

@@ -122,6 +122,6 @@ struct ScenarioFile {
 ScenarioFile read_scenario(const std::string& path);
 ScenarioFile parse_scenario(const std::string& text, const std::string& path);
 
-nlohmann::json scenario_schema();
+nlohmann::ordered_json scenario_schema();
 
 }  // namespace shiftrig::io

@@ -1,0 +1,211 @@
+#include "io/model_file.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "io/field_reader.h"
+#include "io/field_schema.h"
+#include "io/model_fields.h"
+
+namespace shiftrig::io {
+
+namespace {
+
+constexpr double default_safe_time = 0.05;  // [s]
+
+class ModelReader {
+  public:
+    ModelReader(const std::string& text, const std::string& path) {
+        file_.path = path;
+        file_.text = text;
+        context_.path = path;
+    }
+
+    ModelFile read() {
+        const YAML::Node root = parse_yaml(file_.text, file_.path);
+        note_masses(root);
+        FieldReader reader(context_, root, root.Mark(), "", "");
+        fields(reader, model_);
+        reader.finish();
+
+        file_.description = std::move(model_.machine);
+        file_.places = std::move(context_.places);
+        file_.can = model_.can;
+        for (const auto& clutch : file_.description.clutches) clutches_.push_back(clutch.name);
+        check_options();
+        take_gear_paths();
+        take_controller();
+        check_mass("input_mass", file_.description.input_mass);
+        check_mass("output_mass", file_.description.output_mass);
+        return std::move(file_);
+    }
+
+  private:
+    // Links may name masses that stand further down in the file.
+    void note_masses(const YAML::Node& root) {
+        for (const auto& top : entries(file_.path, root, root.Mark(), ""))
+            if (top.key == "masses")
+                for (const auto& mass : entries(file_.path, top.value, top.mark, "masses "))
+                    context_.masses.push_back(mass.key);
+    }
+
+    [[noreturn]] void refuse(const std::string& kind, const std::string& device, const std::string& key,
+                             const std::string& what) const {
+        const std::string owner = device.empty() ? "" : kind + " \"" + device + "\": ";
+        for (const auto& place : file_.places)
+            if (place.kind == kind && place.device == device && place.key == key)
+                throw InputError(file_.path, place.line, place.column, owner + what);
+        throw InputError(file_.path, 1, 1, owner + what);
+    }
+
+    void check_options() const {
+        for (const auto& gear : file_.description.gears)
+            if (!gear.options.empty() && gear.ratio == 0)
+                refuse("gear", gear.name, "in_use", "in_use must be one of its options");
+    }
+
+    void check_clutch(const std::string& kind, const std::string& device, const std::string& key,
+                      const std::string& name) const {
+        if (std::find(clutches_.begin(), clutches_.end(), name) == clutches_.end())
+            refuse(kind, device, key,
+                   (key.empty() ? "" : key + " = " + name + "; ") + "must name a clutch" +
+                       nearest_hint(name, clutches_));
+    }
+
+    void check_mass(const char* key, const std::string& name) const {
+        if (!name.empty() &&
+            std::find(context_.masses.begin(), context_.masses.end(), name) == context_.masses.end())
+            refuse(
+                "", "", key,
+                std::string(key) + " = " + name + "; must name a mass" + nearest_hint(name, context_.masses));
+    }
+
+    void take_gear_paths() {
+        for (const auto& path : model_.gear_paths) {
+            for (const auto& clutch : path.closed) check_clutch("gear path", path.name, "closed", clutch);
+            file_.description.gear_paths.push_back({path.name, path.closed});
+            if (path.lever == 0) continue;
+            for (const auto& other : file_.controller.lever)
+                if (other.lever == path.lever)
+                    refuse("gear path", path.name, "lever",
+                           "lever = " + std::to_string(path.lever) + "; is taken by \"" + other.gear_path +
+                               "\"");
+            file_.controller.lever.push_back({path.lever, path.name});
+        }
+    }
+
+    void take_controller() {
+        const ControllerText& text = model_.controller;
+        file_.controller.command_timeout = text.command_timeout;
+        file_.controller.pedal_clutch = text.pedal_clutch;
+        if (!text.pedal_clutch.empty()) {
+            check_clutch("", "", "controller.pedal_clutch", text.pedal_clutch);
+            if (command_of(text.pedal_clutch) != "release_command")
+                refuse("", "", "controller.pedal_clutch",
+                       "controller.pedal_clutch = " + text.pedal_clutch + "; must be a clutch with release");
+        }
+        for (const auto& safe : text.safe_command) check_clutch("safe command", safe.name, "", safe.name);
+        for (const auto& clutch : file_.description.clutches) take_safe_command(clutch.name);
+    }
+
+    void take_safe_command(const std::string& clutch) {
+        const std::string command = command_of(clutch);
+        const auto& given = model_.controller.safe_command;
+        const auto own =
+            std::find_if(given.begin(), given.end(), [&](const auto& safe) { return safe.name == clutch; });
+        if (own != given.end() && own->command != command)
+            refuse("safe command", clutch, "",
+                   command.empty() ? "this clutch takes no command" : "must set its " + command);
+        if (command.empty()) return;
+        const double open = command == "release_command" ? 1 : 0;
+        file_.controller.safe_commands.push_back(
+            own != given.end()
+                ? SafeCommand{clutch, "clutch." + clutch + "." + command, own->value, own->within}
+                : SafeCommand{clutch, "clutch." + clutch + "." + command, open, default_safe_time});
+    }
+
+    // The input by which the controller commands a clutch; empty if it has none.
+    std::string command_of(const std::string& name) const {
+        for (const auto& clutch : file_.description.clutches) {
+            if (clutch.name != name) continue;
+            if (const auto* hydraulic = std::get_if<plant::ActuationHydraulic>(&clutch.actuation))
+                return hydraulic->solenoid ? "current_command" : "pressure_command";
+            if (std::holds_alternative<plant::ActuationRelease>(clutch.actuation)) return "release_command";
+            if (const auto* apply = std::get_if<plant::ActuationApply>(&clutch.actuation))
+                return apply->by_driver_brake ? "" : "application_command";
+            if (const auto* direct = std::get_if<plant::ActuationDirect>(&clutch.actuation))
+                return direct->profile.pieces.empty() ? "engagement" : "";
+        }
+        return "";
+    }
+
+    ModelFile file_;
+    ModelText model_;
+    ReadContext context_;
+    std::vector<std::string> clutches_;
+};
+
+// A ModelError's field is a member of plant/description.h; the key is that name with its unit.
+bool names_field(const std::string& key, const std::string& field) {
+    const auto last = [](const std::string& path) { return path.substr(path.rfind('.') + 1); };
+    const std::string leaf = last(key), member = last(field);
+    return leaf == member || leaf.starts_with(member + "_");
+}
+
+}  // namespace
+
+ModelFile parse_model(const std::string& text, const std::string& path) {
+    return ModelReader(text, path).read();
+}
+
+ModelFile read_model(const std::string& path) {
+    return parse_model(read_text(path), path);
+}
+
+plant::Model build_model(const ModelFile& file, const plant::BuildOptions& options) {
+    try {
+        return plant::Model::build(file.description, options);
+    } catch (const plant::ModelError& error) {
+        // The longest key that fits is the most specific one; the device's own line where none fits.
+        const Place* best = nullptr;
+        for (const auto& place : file.places) {
+            if (place.device != error.device) continue;
+            const bool fits =
+                place.key.empty() || (!error.field.empty() && names_field(place.key, error.field));
+            const bool same_kind = place.kind == error.kind;
+            if (fits && (!best || (same_kind && place.key.size() >= best->key.size()))) best = &place;
+        }
+        const std::string owner =
+            error.device.empty() ? error.kind : error.kind + " \"" + error.device + "\"";
+        const std::string what = (owner.empty() ? "" : owner + ": ") +
+                                 (best && !best->key.empty() ? best->key : error.field) +
+                                 (error.field.empty() ? "" : " ") + error.rule;
+        throw InputError(file.path, best ? best->line : 0, best ? best->column : 0, what);
+    }
+}
+
+void select_option(plant::Description& description, const std::string& gear, const std::string& option) {
+    for (auto& candidate : description.gears) {
+        if (candidate.name != gear || candidate.options.empty()) continue;
+        std::string known;
+        for (const auto& [name, ratio] : candidate.options) {
+            if (name == option) {
+                candidate.ratio = ratio;
+                return;
+            }
+            known += (known.empty() ? "" : ", ") + name;
+        }
+        throw std::invalid_argument("gear \"" + gear + "\": no option \"" + option + "\"; there are " +
+                                    known);
+    }
+    throw std::invalid_argument("no gear \"" + gear + "\" with options");
+}
+
+nlohmann::ordered_json model_schema() {
+    nlohmann::ordered_json schema = {{"$schema", "http://json-schema.org/draft-07/schema#"},
+                                     {"title", "shiftrig model"}};
+    schema.update(FieldSchema::of<ModelText>());
+    return schema;
+}
+
+}  // namespace shiftrig::io

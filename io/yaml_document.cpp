@@ -1,0 +1,73 @@
+#include "io/yaml_document.h"
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+namespace shiftrig::io {
+
+std::string read_text(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream text;
+    if (!file || !(text << file.rdbuf()))
+        throw InputError(path, 0, 0, "cannot be read (no such file, a folder, empty, or no permission)");
+    return text.str();
+}
+
+void fail(const std::string& path, const YAML::Mark& mark, const std::string& what) {
+    throw InputError(path, mark.line + 1, mark.column + 1, what);
+}
+
+YAML::Node parse_yaml(const std::string& text, const std::string& path) {
+    try {
+        const YAML::Node root = YAML::Load(text);
+        if (!root || root.IsNull()) throw InputError(path, 1, 1, "the file is empty");
+        return root;
+    } catch (const YAML::Exception& error) {
+        fail(path, error.mark, "not valid YAML: " + error.msg);
+    }
+}
+
+std::vector<Entry> entries(const std::string& path, const YAML::Node& map, const YAML::Mark& at,
+                           const std::string& owner) {
+    if (!map.IsMap()) fail(path, at, owner + "= " + as_written(map) + "; must be a map of key: value");
+    std::vector<Entry> own, merged;
+    const auto holds = [](const std::vector<Entry>& list, const std::string& key) {
+        return std::any_of(list.begin(), list.end(), [&](const Entry& entry) { return entry.key == key; });
+    };
+    const auto merge = [&](const YAML::Node& from, const YAML::Mark& mark) {
+        for (auto& entry : entries(path, from, mark, owner + "<< "))
+            if (!holds(merged, entry.key)) merged.push_back(std::move(entry));
+    };
+    for (const auto& pair : map) {
+        const YAML::Mark mark = pair.first.Mark();
+        if (!pair.first.IsScalar()) fail(path, mark, owner + "a key must be a plain word");
+        const std::string key = pair.first.Scalar();
+        if (key == "<<") {
+            if (pair.second.IsSequence())
+                for (const auto& from : pair.second) merge(from, mark);
+            else
+                merge(pair.second, mark);
+            continue;
+        }
+        if (holds(own, key)) fail(path, mark, owner + key + " is given twice");
+        own.push_back({key, mark, pair.second});
+    }
+    for (auto& entry : merged)
+        if (!holds(own, entry.key)) own.push_back(std::move(entry));
+    return own;
+}
+
+std::string as_written(const YAML::Node& node) {
+    if (!node || node.IsNull()) return "(nothing)";
+    if (node.IsScalar()) return node.Scalar().empty() ? "\"\"" : node.Scalar();
+    YAML::Emitter out;
+    out.SetMapFormat(YAML::Flow);
+    out.SetSeqFormat(YAML::Flow);
+    out << node;
+    std::string text = out.c_str();
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    return text.size() <= 60 ? text : text.substr(0, 57) + "...";
+}
+
+}  // namespace shiftrig::io
