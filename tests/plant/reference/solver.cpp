@@ -1,0 +1,428 @@
+#include "tests/plant/reference/solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace shiftrig::reference {
+namespace {
+
+constexpr double overload_tolerance = 1e-12;
+
+double sign_of(Hold hold) { return hold == Hold::plus ? 1 : hold == Hold::minus ? -1 : 0; }
+Hold toward(double value) { return value < 0 ? Hold::minus : Hold::plus; }
+
+// Limits of the loss torque of a mesh at rest that carries M on link 1.
+std::pair<double, double> loss_limits(const Mesh& mesh, double m) {
+    const double driven = (1 - mesh.efficiency) * m, driving = (1 - 1 / mesh.efficiency) * m;
+    return std::minmax(driven, driving);
+}
+
+}  // namespace
+
+Solver::Solver(const System& system) : z(system.start), system_(system), responses_(system) {
+    if (z.size() < system.size()) z.conservativeResizeLike(Vector::Zero(system.size()));
+    for (const auto& friction : system.frictions)
+        mode.friction.push_back(friction.initially_held ? Hold::held : Hold::free);
+    for (const auto& mesh : system.meshes) {
+        const double w = mesh.relative.dot(z.head(system.masses));
+        mode.mesh.push_back(!mesh.lossy() ? Hold::plus : w == 0 ? Hold::held : toward(w));
+        mode.x.push_back(1);
+        mode.at_rest.push_back(mesh.lossy() && w == 0);
+    }
+    force_ = Vector::Zero(system.masses);
+    extra_ = Vector::Zero(system.extras);
+}
+
+double Solver::speed_scale() const { return std::max(1.0, z.head(system_.masses).lpNorm<Eigen::Infinity>()); }
+
+void Solver::note(double time, const std::string& device, const char* what) {
+    changes.push_back({time, device, what});
+}
+
+// ---- torques and rates in a mode ----------------------------------------------------------------------
+
+void Solver::free_torque(When when, const Vector& state, const Mode& trial, Vector& out) {
+    system_.force(when, state, out, extra_);
+    for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
+        const double s = sign_of(trial.friction[f]);
+        if (s == 0) continue;
+        const auto& friction = system_.frictions[f];
+        const double slip = friction.column.dot(state.head(system_.masses));
+        out -= friction.column * (s * friction.sliding(when, state, slip));
+    }
+}
+
+void Solver::solve(When when, const Vector& state, const Mode& trial, Torques& out) {
+    const Response& response = responses_.of(trial);
+    free_torque(when, state, trial, out.free);
+    out.acceleration = response.acceleration * out.free;
+    out.mesh = response.mesh_torque * out.free;
+    out.loss = response.loss_torque * out.free;
+    out.friction = response.friction_torque * out.free;
+}
+
+void Solver::rates(When when, const Vector& state, Vector& dz) {
+    const Response& response = responses_.of(mode);
+    free_torque(when, state, mode, force_);
+    dz.resize(system_.size());
+    dz.head(system_.masses).noalias() = response.acceleration * force_;
+    dz.segment(system_.masses, system_.shafts).noalias() =
+        system_.shaft_columns.transpose() * state.head(system_.masses);
+    dz.tail(system_.extras) = extra_;
+}
+
+// ---- the mode at an instant ----------------------------------------------------------------------------
+
+double Solver::acceleration_tolerance(const Vector& column, const Torques& torques) const {
+    const auto scale = column.cwiseAbs().cwiseProduct(torques.free.cwiseAbs()).cwiseQuotient(system_.inertia);
+    return 1e-10 * scale.sum() + 1e-10 * column.cwiseAbs().dot(torques.acceleration.cwiseAbs()) + 1e-12;
+}
+
+bool Solver::consistent(const Mode& trial, const Torques& torques) {
+    const double torque_tolerance = 1e-9 * (torques.free.lpNorm<Eigen::Infinity>() + 1e-6);
+    if (!responses_.of(trial).sound) return false;
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
+        const auto& mesh = system_.meshes[m];
+        const auto i = static_cast<Eigen::Index>(m);
+        if (!mesh.lossy()) continue;
+        if (trial.mesh[m] == Hold::held) {
+            const auto [low, high] = loss_limits(mesh, torques.mesh[i]);
+            if (torques.loss[i] < low - torque_tolerance || torques.loss[i] > high + torque_tolerance) return false;
+            continue;
+        }
+        const double s = sign_of(trial.mesh[m]);
+        if (trial.x[m] * s * torques.mesh[i] < -torque_tolerance) return false;
+        if (trial.at_rest[m] && s * mesh.relative.dot(torques.acceleration) < -acceleration_tolerance(mesh.relative, torques))
+            return false;
+    }
+    return true;
+}
+
+double Solver::worst_overload(When when, const Torques& torques, const Mode& trial, int* which) {
+    double worst = 0;
+    for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
+        if (trial.friction[f] != Hold::held) continue;
+        const double ratio = std::abs(torques.friction[static_cast<Eigen::Index>(f)]) /
+                             std::max(system_.frictions[f].holding(when, z), 1e-300);
+        if (ratio <= worst) continue;
+        worst = ratio;
+        if (which) *which = static_cast<int>(f);
+    }
+    return worst;
+}
+
+// Tries every combination of loss directions, and of held/released for meshes at rest; of the consistent
+// ones takes the one that overloads held devices least, then the one nearest to the present mode.
+bool Solver::settle_meshes(When when) {
+    struct Option {
+        Hold hold;
+        int x;
+    };
+    std::vector<std::size_t> open;
+    std::vector<std::vector<Option>> options;
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
+        if (!system_.meshes[m].lossy()) continue;
+        std::vector<Option> list{{mode.mesh[m], mode.x[m]}};  // the present one first
+        const auto offer = [&](Option o) {
+            if (o.hold != list[0].hold || (o.hold != Hold::held && o.x != list[0].x)) list.push_back(o);
+        };
+        if (!mode.at_rest[m]) {
+            offer({mode.mesh[m], -mode.x[m]});
+        } else {
+            offer({Hold::held, mode.x[m]});
+            for (const Hold hold : {Hold::plus, Hold::minus})
+                for (const int x : {1, -1}) offer({hold, x});
+        }
+        open.push_back(m);
+        options.push_back(list);
+    }
+    Mode best = mode;
+    double best_overload = std::numeric_limits<double>::infinity();
+    int best_changes = 1000;
+    std::vector<std::size_t> digit(open.size(), 0);
+    Mode trial = mode;
+    Torques torques;
+    for (;;) {
+        int differing = 0;
+        for (std::size_t i = 0; i < open.size(); ++i) {
+            const Option& option = options[i][digit[i]];
+            trial.mesh[open[i]] = option.hold;
+            trial.x[open[i]] = option.x;
+            differing += digit[i] != 0;
+        }
+        solve(when, z, trial, torques);
+        if (consistent(trial, torques)) {
+            const double overload = std::max(1.0 + overload_tolerance, worst_overload(when, torques, trial, nullptr));
+            if (overload < best_overload * (1 - 1e-12) || (overload <= best_overload && differing < best_changes)) {
+                best = trial;
+                best_overload = overload;
+                best_changes = differing;
+            }
+            if (differing == 0 && overload <= 1.0 + overload_tolerance) break;
+        }
+        std::size_t i = 0;
+        while (i < digit.size() && ++digit[i] == options[i].size()) digit[i++] = 0;
+        if (i == digit.size()) break;
+    }
+    const bool found = std::isfinite(best_overload);
+    for (const std::size_t m : open) {
+        if (best.mesh[m] != mode.mesh[m])
+            note(when.t, system_.meshes[m].name, best.mesh[m] == Hold::held ? "mesh sticks" : "mesh moves");
+        else if (best.x[m] != mode.x[m] && best.mesh[m] != Hold::held)
+            note(when.t, system_.meshes[m].name, best.x[m] > 0 ? "link 1 drives" : "link 1 is driven");
+    }
+    mode = best;
+    return found;
+}
+
+void Solver::engage_and_release(When when) {
+    for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
+        const auto& friction = system_.frictions[f];
+        const bool engaged = friction.holding(when, z) > 1e-12 * friction.nominal;
+        if (engaged == (mode.friction[f] != Hold::free)) continue;
+        const double slip = friction.column.dot(z.head(system_.masses));
+        mode.friction[f] = !engaged ? Hold::free : std::abs(slip) <= 1e-9 ? Hold::held : toward(slip);
+        note(when.t, friction.name, !engaged ? "free" : mode.friction[f] == Hold::held ? "locks" : "slips");
+    }
+}
+
+// Puts the speeds onto the constraints of the mode, and holds whatever is thereby brought to rest too.
+void Solver::join() {
+    auto omega = z.head(system_.masses);
+    const Matrix& projector = responses_.of(mode).projector;
+    omega = (projector * omega).eval();
+    const double small = 1e-10 * speed_scale();
+    const auto pinned = [&](const Vector& column) {
+        return (projector.transpose() * column).norm() < 1e-8 * column.norm() && std::abs(column.dot(omega)) < small;
+    };
+    for (std::size_t f = 0; f < system_.frictions.size(); ++f)
+        if (sign_of(mode.friction[f]) != 0 && pinned(system_.frictions[f].column)) mode.friction[f] = Hold::held;
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m)
+        if (system_.meshes[m].lossy() && !mode.at_rest[m] && pinned(system_.meshes[m].relative)) mode.at_rest[m] = true;
+}
+
+void Solver::settle(When when) {
+    engage_and_release(when);
+    for (int pass = 0;; ++pass) {
+        const bool found = settle_meshes(when);
+        if (!found || pass == 60) {
+            ++unresolved;
+            note(when.t, "", found ? "no end of settling" : "no consistent mode");
+            break;
+        }
+        solve(when, z, mode, work_);
+        int worst = -1;
+        if (worst_overload(when, work_, mode, &worst) > 1 + overload_tolerance) {
+            const auto f = static_cast<std::size_t>(worst);
+            mode.friction[f] = toward(work_.friction[worst]);
+            note(when.t, system_.frictions[f].name, "slips");
+            continue;
+        }
+        bool closed = false;  // opened in this instant, then driven back by another device's opening
+        for (std::size_t f = 0; f < system_.frictions.size() && !closed; ++f) {
+            const double s = sign_of(mode.friction[f]);
+            const auto& column = system_.frictions[f].column;
+            if (s == 0 || std::abs(column.dot(z.head(system_.masses))) > 1e-10 * speed_scale()) continue;
+            if (s * column.dot(work_.acceleration) >= -acceleration_tolerance(column, work_)) continue;
+            mode.friction[f] = Hold::held;
+            note(when.t, system_.frictions[f].name, "locks");
+            closed = true;
+        }
+        if (!closed) break;
+    }
+    solve(when, z, mode, work_);
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
+        const auto& mesh = system_.meshes[m];
+        if (!mode.at_rest[m] || mode.mesh[m] == Hold::held) continue;
+        if (std::abs(mesh.relative.dot(work_.acceleration)) > acceleration_tolerance(mesh.relative, work_))
+            mode.at_rest[m] = false;
+    }
+}
+
+void Solver::begin(double inside) {
+    for (std::size_t f = 0; f < mode.friction.size(); ++f)
+        if (mode.friction[f] == Hold::held && system_.frictions[f].holding({0, inside}, z) <= 0)
+            mode.friction[f] = Hold::free;
+    join();
+    settle({0, inside});
+}
+
+// ---- events ---------------------------------------------------------------------------------------------
+
+void Solver::margins(When when, const Vector& state, Vector& g) {
+    solve(when, state, mode, work_);
+    g.resize(static_cast<Eigen::Index>(2 * system_.frictions.size() + 2 * system_.meshes.size()));
+    const double speed_tolerance = 1e-12 * speed_scale();
+    // Twice what consistent() asks for: a mode it accepts is not left at once.
+    const double torque_tolerance = 2e-9 * (work_.free.lpNorm<Eigen::Infinity>() + 1e-6);
+    Eigen::Index i = 0;
+    for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
+        const auto& friction = system_.frictions[f];
+        const double holding = friction.holding(when, state);
+        const double threshold = 1e-12 * friction.nominal;
+        double first = 1, second = holding - threshold;
+        if (mode.friction[f] == Hold::free)
+            second = threshold - holding;
+        else if (mode.friction[f] == Hold::held)
+            first = holding * (1 + 2 * overload_tolerance) - std::abs(work_.friction[static_cast<Eigen::Index>(f)]);
+        else
+            first = sign_of(mode.friction[f]) * friction.column.dot(state.head(system_.masses)) + speed_tolerance;
+        g[i++] = first;
+        g[i++] = second;
+    }
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
+        const auto& mesh = system_.meshes[m];
+        const auto k = static_cast<Eigen::Index>(m);
+        double first = 1, second = 1;
+        if (mesh.lossy() && mode.mesh[m] == Hold::held) {
+            const auto [low, high] = loss_limits(mesh, work_.mesh[k]);
+            first = std::min(high - work_.loss[k], work_.loss[k] - low) + torque_tolerance;
+        } else if (mesh.lossy()) {
+            const double s = sign_of(mode.mesh[m]);
+            first = mode.at_rest[m] ? 2 * acceleration_tolerance(mesh.relative, work_) -
+                                          std::abs(mesh.relative.dot(work_.acceleration))
+                                    : s * mesh.relative.dot(state.head(system_.masses)) + speed_tolerance;
+            second = mode.x[m] * s * work_.mesh[k] + torque_tolerance;
+        }
+        g[i++] = first;
+        g[i++] = second;
+    }
+}
+
+bool Solver::violated(When when, const Vector& state) {
+    margins(when, state, margins_);
+    return (margins_.array() < 0).any();
+}
+
+// Closes pairs whose slip has just changed sign at (when, z) and brings the mode up to date.
+void Solver::apply_violations(When when) {
+    margins(when, z, margins_);
+    bool joined = false;
+    for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
+        if (sign_of(mode.friction[f]) == 0 || margins_[static_cast<Eigen::Index>(2 * f)] >= 0) continue;
+        mode.friction[f] = Hold::held;
+        note(when.t, system_.frictions[f].name, "locks");
+        joined = true;
+    }
+    const auto base = 2 * system_.frictions.size();
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
+        if (mode.mesh[m] == Hold::held || mode.at_rest[m] || margins_[static_cast<Eigen::Index>(base + 2 * m)] >= 0) continue;
+        // Joined by the same projection as everything that is held now.
+        mode.at_rest[m] = true;
+        mode.mesh[m] = Hold::held;
+        note(when.t, system_.meshes[m].name, "mesh rests");
+        joined = true;
+    }
+    if (joined) join();
+    settle(when);
+}
+
+Sample Solver::sample(When when) {
+    solve(when, z, mode, work_);
+    Sample s;
+    s.time = when.t;
+    s.z = z;
+    s.mode = mode;
+    s.friction_torque = work_.friction;
+    for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
+        const double sign = sign_of(mode.friction[f]);
+        if (sign != 0) {
+            const double slip = system_.frictions[f].column.dot(z.head(system_.masses));
+            s.friction_torque[static_cast<Eigen::Index>(f)] = sign * system_.frictions[f].sliding(when, z, slip);
+        }
+    }
+    s.mesh_torque = work_.mesh;
+    s.loss_torque = work_.loss;
+    s.unique = responses_.of(mode).redundancy == 0;
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m)
+        if (mode.at_rest[m] && mode.mesh[m] != Hold::held) s.unique = false;
+    return s;
+}
+
+// ---- the run --------------------------------------------------------------------------------------------
+
+void Solver::rk4(double t, double inside, double h, Vector& out) {
+    rates({t, inside}, z, k1_);
+    stage_ = z + h / 2 * k1_;
+    rates({t + h / 2, inside}, stage_, k2_);
+    stage_ = z + h / 2 * k2_;
+    rates({t + h / 2, inside}, stage_, k3_);
+    stage_ = z + h * k3_;
+    rates({t + h, inside}, stage_, k4_);
+    out = z + h / 6 * (k1_ + 2 * k2_ + 2 * k3_ + k4_);
+}
+
+// Bound on the eigenvalues of the free machine: no mode with more constraints is faster.
+double Solver::fastest_rate() {
+    const Vector root = system_.inertia.cwiseSqrt().cwiseInverse();
+    const Matrix a = root.asDiagonal() * system_.shaft_columns;
+    const Matrix k = a * system_.stiffness.asDiagonal() * a.transpose();
+    const Matrix d = a * system_.damping.asDiagonal() * a.transpose() +
+                     root.asDiagonal() * system_.damper * root.asDiagonal();
+    return std::max(std::sqrt(k.operatorNorm()), d.operatorNorm());
+}
+
+Result Solver::run(double until, const Options& options) {
+    Result result;
+    result.fastest_rate = fastest_rate();
+    const double largest = std::min(options.step, options.resolution / std::max(result.fastest_rate, 1e-9));
+    const auto grid_points = static_cast<long>(std::lround(until / options.grid));
+    std::size_t next_break = 0;
+    long next_grid = 1;
+    double t = 0;
+    bool first = true;
+    Vector end;
+    int events = 0;
+    while (next_grid <= grid_points && !result.gave_up) {
+        double stop = static_cast<double>(next_grid) * options.grid;
+        while (next_break < system_.breaks.size() && system_.breaks[next_break] <= t + 1e-12) ++next_break;
+        if (next_break < system_.breaks.size() && system_.breaks[next_break] < stop - 1e-12)
+            stop = system_.breaks[next_break];
+        const double inside = (t + stop) / 2;
+        if (first) {
+            begin(inside);
+            result.samples.push_back(sample({0, inside}));
+            first = false;
+        } else {
+            settle({t, inside});  // laws may have jumped
+        }
+        const auto steps = static_cast<long>(std::ceil((stop - t) / largest));
+        const double from = t, h = (stop - t) / static_cast<double>(steps);
+        for (long i = 0; i < steps && !result.gave_up; ++i) {
+            double begin_time = from + static_cast<double>(i) * h;
+            double left = h;
+            for (;;) {
+                rk4(begin_time, inside, left, end);
+                if (!violated({begin_time + left, inside}, end)) break;
+                double low = 0, high = 1;
+                for (int k = 0; k < 45; ++k) {
+                    const double middle = (low + high) / 2;
+                    rk4(begin_time, inside, middle * left, end);
+                    (violated({begin_time + middle * left, inside}, end) ? high : low) = middle;
+                }
+                rk4(begin_time, inside, high * left, end);
+                z = end;
+                begin_time += high * left;
+                left *= 1 - high;
+                apply_violations({begin_time, inside});
+                if (++events > options.event_limit) {
+                    result.gave_up = true;
+                    break;
+                }
+            }
+            z = end;
+            if (!z.allFinite()) result.gave_up = true;
+        }
+        t = stop;
+        if (std::abs(t - static_cast<double>(next_grid) * options.grid) < 1e-12) {
+            result.samples.push_back(sample({t, inside}));
+            ++next_grid;
+        }
+    }
+    result.changes = changes;
+    result.unresolved = unresolved;
+    return result;
+}
+
+}  // namespace shiftrig::reference

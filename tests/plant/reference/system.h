@@ -1,0 +1,76 @@
+// The reference solver's own picture of a machine, read from plant::Description and from nothing else of
+// the plant. It exists to contradict the engine: no operator, mode table or formula is shared with it.
+//
+// State z = [ω (one per mass); φ (one per shaft); extra (states of added laws)]. Two kinds of devices
+// can hold their parts together:
+//   Friction  slip w = columnᵀω, torque T on the first link, masses feel −column·T
+//   Mesh      gear or row: columnᵀω = 0 always, torque M on link 1, masses feel −column·M − loss_column·L,
+//             L the loss torque: (1 − η^x)·M while it moves, anything between its two limits at rest
+#pragma once
+
+#include <Eigen/Dense>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "plant/description.h"
+
+namespace shiftrig::reference {
+
+using Vector = Eigen::VectorXd;
+using Matrix = Eigen::MatrixXd;
+
+// A time and an instant inside the smooth interval it bounds: laws that jump at t are taken from that side.
+struct When {
+    double t = 0;
+    double inside = 0;
+};
+
+double evaluate(const plant::Waveform& waveform, When when);
+
+struct Friction {
+    std::string name;
+    Vector column;
+    double nominal = 0;  // [Nm] weight of the device where a torque split is not unique
+    bool bearing = false;
+    bool initially_held = false;
+    // Capacities [Nm] ≥ 0; sliding depends on |slip|.
+    std::function<double(When, const Vector& z, double slip)> sliding;
+    std::function<double(When, const Vector& z)> holding;
+};
+
+struct Mesh {
+    std::string name;
+    bool planetary = false;
+    double ratio = 0, efficiency = 1;
+    Vector column;       // kinematics
+    Vector relative;     // ω_1 − ω_carrier = relativeᵀω
+    Vector loss_column;  // ratio·(e_2 − e_carrier)
+    bool lossy() const { return efficiency < 1; }
+};
+
+struct System {
+    explicit System(const plant::Description& description);
+
+    int masses = 0, shafts = 0, extras = 0;
+    int size() const { return masses + shafts + extras; }
+    std::vector<std::string> mass_names, shaft_names;
+    Vector inertia;
+    Matrix shaft_columns;  // masses × shafts
+    Vector stiffness, damping;
+    Matrix damper;         // M̃ −= damper·ω
+    std::vector<Friction> frictions;
+    std::vector<Mesh> meshes;
+    std::vector<plant::TorqueSource> sources;
+    std::vector<int> source_mass;
+    // Adds forces on the masses and fills the rates of the extra states (all of z may be read).
+    std::function<void(When, const Vector& z, Vector& force, Eigen::Ref<Vector> extra_rate)> law;
+    std::vector<double> breaks;  // times at which some law has a jump or a kink, sorted
+    Vector start;
+
+    // Torque on every mass except from meshes and friction devices.
+    void force(When when, const Vector& z, Vector& out, Eigen::Ref<Vector> extra_rate) const;
+    int mass(const std::string& name) const;
+};
+
+}  // namespace shiftrig::reference
