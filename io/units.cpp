@@ -34,6 +34,7 @@ constexpr std::array spellings{
     UnitSpelling{"_cm3", 1e-6, std::nullopt},
     UnitSpelling{"_l_per_min", 1e-3 / 60, std::nullopt},
     UnitSpelling{"_bar_per_s", 1e5, std::nullopt},
+    UnitSpelling{"_nm_per_bar", 1e-5, std::nullopt},
 };
 
 }  // namespace

@@ -1,0 +1,64 @@
+// The reference shift controller: sensors in, clutch commands out, once every control cycle. It has no clock but
+// its cycle count, opens no bus and knows nothing of the bench; node.h puts it on a bus.
+//
+// It is meant to be read, and to be the start of your own. The state of the driveline is one of
+//
+//   listening nothing is known yet, nothing is commanded; a gear found locked is taken over
+//   neutral   nothing closed; waits for a lever and an engine that can start off
+//   launch    one clutch slips until input and output run together (standing start, shuttle, restart in motion)
+//   driving   one clutch locked at full pressure
+//   shift     one clutch hands over to another (shift.h)
+//   limp      signals are missing: the gear that was locked is held, anything half done is opened
+#pragma once
+
+#include <array>
+
+#include "apps/tcu/calibration.h"
+#include "apps/tcu/gear_choice.h"
+#include "apps/tcu/machine.h"
+#include "apps/tcu/shift.h"
+
+namespace shiftrig::tcu {
+
+class Controller {
+  public:
+    // The calibration must outlive the controller. Everything else is its state: a copy is a snapshot.
+    explicit Controller(const Calibration& calibration) noexcept : cal_(&calibration) {}
+
+    // One control cycle. Never throws, allocates or blocks. The commands are to be sent unless the mode is `listening`.
+    Commands step(const Sensors& sensors) noexcept;
+
+    Mode mode() const noexcept { return mode_; }
+
+  private:
+    void listen(const Sensors& s) noexcept;
+    void neutral(const Sensors& s, Commands& c) noexcept;
+    void launch(const Sensors& s, Commands& c) noexcept;
+    void driving(const Sensors& s, Commands& c) noexcept;
+    void shift(const Sensors& s, Commands& c) noexcept;
+    void limp(const Sensors& s, Commands& c) noexcept;
+
+    void enter(Mode mode) noexcept;
+    void begin_launch(const Sensors& s, int gear) noexcept;
+    bool may_start_off(const Sensors& s, int gear) const noexcept;
+    bool would_stall(const Sensors& s) const noexcept;
+    bool trusts(const Sensors& s) noexcept;
+
+    const Calibration* cal_;
+    GearChoice choice_;
+    Mode mode_ = Mode::listening;
+    int gear_ = 0;             // that is locked, or being launched in; 0 none
+    double in_mode_ = 0;       // time since the mode was entered [s]
+    double slipping_ = 0;      // slip in gear at full pressure for so long [s]
+    double trusted_ = 0;       // signals believable for so long [s]
+    int failed_lever_ = 0;     // where the lever stood when an engagement failed: not again until it moves
+    Fill fill_;
+    SlipWatch slip_;
+    bool by_main_clutch_ = false; // the launch slips the main clutch, else the gear's own
+    double launch_speed_ = 0;     // of the engine when the launch began [rad/s]
+    double launch_torque_ = 0;    // capacity asked for [Nm]
+    double pressure_ = 0;         // commanded to the gear's clutch in launch and driving [Pa]
+    Shift shift_;
+};
+
+}  // namespace shiftrig::tcu
