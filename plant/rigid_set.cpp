@@ -1,0 +1,106 @@
+#include "plant/rigid_set.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "plant/plant.h"
+
+namespace shiftrig::plant {
+namespace {
+
+constexpr double rank_threshold = 1e-9;
+
+// J^(−1/2) C with columns of length 1: rows and columns of very different units become comparable.
+Eigen::MatrixXd scaled_columns(const RigidSet& set, const std::vector<double>& inertia) {
+    Eigen::MatrixXd c = set.columns;
+    for (Eigen::Index j = 0; j < c.rows(); ++j) c.row(j) /= std::sqrt(inertia[static_cast<std::size_t>(j)]);
+    for (Eigen::Index k = 0; k < c.cols(); ++k) c.col(k).normalize();
+    return c;
+}
+
+Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(const Eigen::MatrixXd& scaled) {
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+    qr.setThreshold(rank_threshold);
+    qr.compute(scaled);
+    return qr;
+}
+
+}  // namespace
+
+RigidSet rigid_set(const Description& d, const Structure& s, const std::vector<std::string>& closed,
+                   const RigidOptions& options) {
+    for (const std::string& name : closed) {
+        const int index = s.pair(name);
+        if (index < 0 || s.pairs[static_cast<std::size_t>(index)].kind != PairKind::clutch) {
+            throw ModelError("model", d.name, "closed", "= \"" + name + "\" is no clutch or brake");
+        }
+    }
+    RigidSet set;
+    const auto add = [&set](const std::string& name, RigidSet::Kind kind, std::size_t index,
+                            std::array<Link, 3> links) {
+        set.members.push_back({name, kind, static_cast<int>(index), links});
+    };
+    for (std::size_t i = 0; i < s.meshes.size(); ++i) {
+        add(s.meshes[i].name, RigidSet::Kind::mesh, i, s.meshes[i].column(s.meshes[i].ratio));
+    }
+    for (std::size_t i = 0; i < s.pairs.size(); ++i) {
+        const FrictionPair& pair = s.pairs[i];
+        if (pair.kind != PairKind::clutch) continue;
+        const bool named = std::find(closed.begin(), closed.end(), pair.name) != closed.end();
+        const bool contact = d.clutches[static_cast<std::size_t>(pair.source)].radius > 0;
+        if (named || (contact && options.rolling_tyres)) {
+            add(pair.name, RigidSet::Kind::pair, i, {pair.links[0], pair.links[1], Link{}});
+        }
+    }
+    for (std::size_t i = 0; options.stiff_shafts && i < s.shafts.size(); ++i) {
+        add(s.shafts[i].name, RigidSet::Kind::shaft, i, {s.shafts[i].links[0], s.shafts[i].links[1], Link{}});
+    }
+    for (std::size_t i = 0; options.rolling_tyres && i < d.tyres.size(); ++i) {
+        const BrixiusTyre& tyre = d.tyres[i];
+        add(tyre.name, RigidSet::Kind::tyre, i,
+            {Link{s.mass(tyre.wheel), 1}, Link{s.mass(tyre.body), -1 / tyre.radius}, Link{}});
+    }
+    set.columns = Eigen::MatrixXd::Zero(s.masses(), static_cast<Eigen::Index>(set.members.size()));
+    for (std::size_t k = 0; k < set.members.size(); ++k) {
+        for (const Link& link : set.members[k].links) {
+            if (link.mass >= 0) set.columns(link.mass, static_cast<Eigen::Index>(k)) += link.factor;
+        }
+    }
+    return set;
+}
+
+Eigen::MatrixXd motions(const RigidSet& set, const std::vector<double>& inertia) {
+    const auto n = static_cast<Eigen::Index>(inertia.size());
+    Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(n, n);
+    if (set.columns.cols() > 0) {
+        const auto qr = factor(scaled_columns(set, inertia));
+        basis = qr.householderQ() * basis;
+        basis = basis.rightCols(n - qr.rank()).eval();
+    }
+    for (Eigen::Index j = 0; j < n; ++j) basis.row(j) /= std::sqrt(inertia[static_cast<std::size_t>(j)]);
+    return basis;
+}
+
+std::vector<TieUp> tie_ups(const RigidSet& set, const std::vector<double>& inertia) {
+    std::vector<TieUp> result;
+    if (set.columns.cols() == 0) return result;
+    const auto qr = factor(scaled_columns(set, inertia));
+    const Eigen::Index rank = qr.rank(), cols = set.columns.cols();
+    const auto& order = qr.colsPermutation().indices();
+    const Eigen::MatrixXd r = qr.matrixR().topRows(rank).triangularView<Eigen::Upper>();
+    for (Eigen::Index dependent = rank; dependent < cols; ++dependent) {
+        const Eigen::VectorXd parts = r.leftCols(rank).triangularView<Eigen::Upper>().solve(r.col(dependent));
+        std::vector<int> devices{order[dependent]};
+        for (Eigen::Index i = 0; i < rank; ++i) {
+            if (std::fabs(parts[i]) > 1e-7) devices.push_back(order[i]);
+        }
+        std::sort(devices.begin(), devices.end());
+        TieUp tie;
+        for (int k : devices) tie.devices.push_back(set.members[static_cast<std::size_t>(k)].name);
+        result.push_back(tie);
+    }
+    return result;
+}
+
+}  // namespace shiftrig::plant

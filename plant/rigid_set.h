@@ -1,0 +1,47 @@
+// The devices that act as rigid ones when a set of clutches and brakes is closed, and the motions they leave.
+// Statics, gear ratios and natural frequencies all start here.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "plant/structure.h"
+
+namespace shiftrig::plant {
+
+// Gears and planetary rows always belong to it, closed pairs as named. Wheel contacts count as closed and
+// tyres as rolling without slip where `rolling` is asked for; shafts count as untwistable where `stiff` is.
+struct RigidOptions {
+    bool stiff_shafts = true;
+    bool rolling_tyres = true;
+};
+
+struct RigidSet {
+    enum class Kind { mesh, pair, shaft, tyre };
+    struct Member {
+        std::string name;
+        Kind kind{};
+        int index = -1;             // into structure.meshes, .pairs, .shafts or description.tyres
+        std::array<Link, 3> links;  // its SDM column, unused links have mass −1
+    };
+    std::vector<Member> members;
+    Eigen::MatrixXd columns;  // masses × members, kinematic (A, with u)
+};
+
+// Throws ModelError where `closed` names no clutch or brake.
+RigidSet rigid_set(const Description& description, const Structure& structure,
+                   const std::vector<std::string>& closed, const RigidOptions& options = {});
+
+// All speeds that the set allows: the columns of the result span {ω : Cᵀω = 0} and are J-orthonormal.
+// Zero columns: the set locks everything.
+Eigen::MatrixXd motions(const RigidSet& set, const std::vector<double>& inertia);
+
+// A loop of rigid devices whose rows depend on each other: the split of their torques is not unique.
+struct TieUp {
+    std::vector<std::string> devices;
+};
+std::vector<TieUp> tie_ups(const RigidSet& set, const std::vector<double>& inertia);
+
+}  // namespace shiftrig::plant
