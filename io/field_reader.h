@@ -21,6 +21,7 @@
 #include "io/model_file.h"
 #include "io/nearest.h"
 #include "io/rule.h"
+#include "io/scenario_file.h"
 #include "io/units.h"
 #include "io/yaml_document.h"
 
@@ -109,13 +110,18 @@ class FieldReader {
         value = value == "housing" ? "" : mass(*entry, key, value);
     }
     void names(const char* key, std::vector<std::string>& values, const char*) {
-        const Entry* entry = required(key);
+        if (const Entry* entry = required(key)) read_names(*entry, key, values);
+    }
+    void optional_names(const char* key, std::vector<std::string>& values, const char*) {
+        if (const Entry* entry = take(key)) read_names(*entry, key, values);
+    }
+    // {name: word, …}
+    void named_words(const char* key, std::vector<std::pair<std::string, std::string>>& values, const char*) {
+        const Entry* entry = take(key);
         if (!entry) return;
-        if (!entry->value.IsSequence()) refuse(*entry, key, "must be a list of names");
-        for (const auto& item : entry->value) {
-            if (!item.IsScalar()) refuse(*entry, key, "must be a list of names");
-            values.push_back(item.Scalar());
-        }
+        for (const auto& item :
+             entries(context_.path, entry->value, entry->mark, owner() + prefix_ + key + " "))
+            values.emplace_back(item.key, word(item, std::string(key) + "." + item.key));
     }
 
     // ---- tables --------------------------------------------------------------------------------------
@@ -173,7 +179,9 @@ class FieldReader {
         if (!entry->value.IsSequence()) refuse(*entry, key, "must be a list");
         for (const auto& item : entry->value) {
             FieldReader inner(context_, item, item.Mark(), kind_, device_, prefix_ + key + ".");
-            fields(inner, values.emplace_back());
+            auto& value = values.emplace_back();
+            note_place(value, item.Mark());
+            fields(inner, value);
             inner.finish();
         }
     }
@@ -212,6 +220,27 @@ class FieldReader {
             chosen->list();
         else if (missing_.empty())
             missing_ = owner() + prefix_ + "needs one of " + keys;
+    }
+    // ---- signals with their unit as a suffix (scenarios) ---------------------------------------------
+    void quantity(const char* key, NamedQuantity& value, const char*) {
+        const Entry* entry = required(key);
+        if (entry) value = named_quantity(word(*entry, key), entry->value.Mark());
+    }
+    // {signal_with_unit: number, …}
+    void settings(const char* key, std::vector<Setting>& values, const char*) {
+        const Entry* entry = take(key);
+        if (!entry) return;
+        for (const auto& item :
+             entries(context_.path, entry->value, entry->mark, owner() + prefix_ + key + " "))
+            values.push_back(setting(item, std::string(key) + "." + item.key));
+    }
+    // Every key not taken so far that looks like a signal: with a dot in it.
+    void other_settings(std::vector<Setting>& values, const char*) {
+        for (const auto& entry : entries_) {
+            if (taken_.contains(entry.key) || entry.key.find('.') == std::string::npos) continue;
+            taken_.insert(entry.key);
+            values.push_back(setting(entry, entry.key));
+        }
     }
     // A part that another reader understands; undefined where absent.
     void raw(const char* key, YAML::Node& value, const char*) {
@@ -281,6 +310,34 @@ class FieldReader {
         if (std::find(context_.masses.begin(), context_.masses.end(), name) == context_.masses.end())
             refuse(entry, key, "must name a mass" + nearest_hint(name, context_.masses));
         return name;
+    }
+    void read_names(const Entry& entry, const char* key, std::vector<std::string>& values) const {
+        if (!entry.value.IsSequence()) refuse(entry, key, "must be a list of names");
+        for (const auto& item : entry.value) {
+            if (!item.IsScalar()) refuse(entry, key, "must be a list of names");
+            values.push_back(item.Scalar());
+        }
+    }
+    static NamedQuantity named_quantity(const std::string& written, const YAML::Mark& mark) {
+        NamedQuantity quantity{written, written, plant::Unit::one, 1, mark.line + 1, mark.column + 1};
+        if (const UnitSpelling* spelling = unit_spelling(written); spelling && spelling->unit) {
+            quantity.signal.resize(written.size() - spelling->suffix.size());
+            quantity.unit = *spelling->unit;
+            quantity.factor = spelling->factor;
+        }
+        return quantity;
+    }
+    Setting setting(const Entry& entry, const std::string& path) const {
+        const NamedQuantity quantity = named_quantity(entry.key, entry.mark);
+        return {quantity, quantity.factor * checked(entry, path, rules::any)};
+    }
+    // Items that keep their own place, for errors and verdicts found later.
+    template <class Struct>
+    static void note_place(Struct& value, const YAML::Mark& mark) {
+        if constexpr (requires { value.line, value.column; }) {
+            value.line = mark.line + 1;
+            value.column = mark.column + 1;
+        }
     }
     template <class Struct>
     void read_nested(const Entry& entry, const char* key, Struct& value) {

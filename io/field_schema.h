@@ -20,6 +20,7 @@ class FieldSchema {
     // The schema of a map; call after the field list has run.
     json schema() const {
         json result = {{"type", "object"}, {"additionalProperties", false}, {"properties", properties_}};
+        if (!signals_.is_null()) result["patternProperties"] = signals_;
         if (!required_.empty()) result["required"] = required_;
         if (alternatives_.size() == 1) result["oneOf"] = alternatives_.front();
         if (alternatives_.size() > 1)
@@ -101,6 +102,19 @@ class FieldSchema {
         }
         alternatives_.push_back(std::move(group));
     }
+    void optional_names(const char* key, std::vector<std::string>&, const char* text) {
+        add(key, {{"type", "array"}, {"items", word()}}, text);
+    }
+    void named_words(const char* key, std::vector<std::pair<std::string, std::string>>&, const char* text) {
+        add(key, {{"type", "object"}, {"additionalProperties", word()}}, text);
+    }
+    void quantity(const char* key, NamedQuantity&, const char* text) { require(key, word(), text); }
+    void settings(const char* key, std::vector<Setting>&, const char* text) {
+        add(key, {{"type", "object"}, {"additionalProperties", {{"type", "number"}}}}, text);
+    }
+    void other_settings(std::vector<Setting>&, const char* text) {
+        signals_ = {{"[.]", {{"type", "number"}, {"description", text}}}};
+    }
     void raw(const char* key, YAML::Node&, const char* text) { add(key, json::object(), text); }
 
     template <class Struct>
@@ -131,6 +145,7 @@ class FieldSchema {
     }
 
     json properties_ = json::object(), required_ = json::array();
+    json signals_;  // pattern of free keys; null: none
     std::vector<json> alternatives_;
 };
 

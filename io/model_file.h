@@ -49,7 +49,8 @@ struct ModelFile {
     std::string text;  // the whole file, verbatim, for the recording
     plant::Description description;
     ControllerSide controller;
-    YAML::Node can;  // the stanza `can:`, undefined if there is none; its format is io/can's
+    // The stanza `can:`, undefined if there is none; its format is io/can's.
+    YAML::Node can{YAML::NodeType::Undefined};
     std::vector<Place> places;
 };
 

@@ -28,14 +28,16 @@
 #include <vector>
 
 #include "io/input_error.h"
+#include "io/signals.h"
 
 namespace shiftrig::io {
 
 // A signal as the user names it: `mass.vehicle.speed_kmh` is signal `mass.vehicle.speed` in km/h.
 struct NamedQuantity {
-    std::string written;  // "mass.vehicle.speed_kmh"
-    std::string signal;   // "mass.vehicle.speed"
-    double factor = 1;    // SI = factor · written value
+    std::string written;                  // "mass.vehicle.speed_kmh"
+    std::string signal;                   // "mass.vehicle.speed"
+    plant::Unit unit = plant::Unit::one;  // that its suffix belongs to
+    double factor = 1;                    // SI = factor · written value
     int line = 0, column = 0;
 };
 
@@ -113,14 +115,22 @@ struct ScenarioFile {
     double duration = 0;      // [s]
     ScenarioStart start;
     std::vector<TimedSetting> timeline;  // sorted by `at`, file order where equal
-    YAML::Node bus_faults;               // undefined if there are none; its format is io/can's
-    YAML::Node controller;  // undefined: the command line decides; calibration of the built-in one
+    int seed = 1;                        // of noise and random faults
+    // Parts that others understand; undefined where absent.
+    YAML::Node bus_faults{YAML::NodeType::Undefined};  // io/can
+    YAML::Node bus{YAML::NodeType::Undefined};         // the rig: bit rate and the like of the in-process bus
+    YAML::Node controller{
+        YAML::NodeType::Undefined};  // the rig: calibration of the built-in controller, its faults
     Expectations expect;
 };
 
 // Throws InputError.
 ScenarioFile read_scenario(const std::string& path);
 ScenarioFile parse_scenario(const std::string& text, const std::string& path);
+
+// Every signal the scenario names exists and is written in its own unit; throws InputError naming the place
+// and the nearest signal. Masses in start.speeds are checked against `mass.<name>.speed`.
+void check_signals(const ScenarioFile& scenario, const SignalTable& signals);
 
 nlohmann::ordered_json scenario_schema();
 

@@ -1,0 +1,118 @@
+#include "io/scenario_file.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "io/field_reader.h"
+#include "io/field_schema.h"
+#include "io/scenario_fields.h"
+#include "io/units.h"
+
+namespace shiftrig::io {
+
+namespace {
+
+std::vector<TimedSetting> by_time(const std::vector<TimelineText>& timeline) {
+    std::vector<TimedSetting> result;
+    for (const auto& moment : timeline)
+        for (const auto& setting : moment.settings) result.push_back({moment.at, moment.over, setting});
+    std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
+    return result;
+}
+
+Expectations expectations(const std::string& path, const ExpectText& text) {
+    Expectations expect;
+    expect.shifts_given = text.no_shifts || !text.shifts.empty();
+    for (const auto& shift : text.shifts) {
+        if (text.no_shifts)
+            throw InputError(path, shift.line, shift.column,
+                             "expect.shifts and no_shifts exclude each other");
+        expect.shifts.push_back({shift.from + "->" + shift.to, shift.completed, shift.line, shift.column});
+    }
+    expect.metrics = text.scorecard;
+    for (auto event : text.must) expect.events.push_back(std::move(event));
+    for (auto event : text.must_not) {
+        event.must = false;
+        expect.events.push_back(std::move(event));
+    }
+    expect.signals = text.signals;
+    for (const auto& last : text.final_state)
+        expect.signals.push_back(
+            {last.quantity, {rules::unbounded, rules::unbounded}, last.minimum, last.maximum});
+
+    for (const auto& event : expect.events)
+        if (event.kind.empty())
+            throw InputError(path, event.line, event.column, "expect: the event's kind is missing");
+    for (auto& bound : expect.signals) {
+        if (bound.minimum == -rules::unbounded && bound.maximum == rules::unbounded)
+            throw InputError(path, bound.quantity.line, bound.quantity.column,
+                             "expect: " + bound.quantity.written + " needs min or max");
+        bound.minimum *= bound.quantity.factor;
+        bound.maximum *= bound.quantity.factor;
+    }
+    for (const auto& limit : expect.metrics)
+        if (limit.minimum == -rules::unbounded && limit.maximum == rules::unbounded)
+            throw InputError(path, limit.line, limit.column, "expect: " + limit.metric + " needs min or max");
+    return expect;
+}
+
+void check(const ScenarioFile& scenario, const NamedQuantity& quantity, const std::string& name,
+           const SignalTable& signals) {
+    const int index = signals.find(name);
+    if (index < 0) {
+        const auto near = signals.nearest(name, 1);
+        throw InputError(scenario.path, quantity.line, quantity.column,
+                         quantity.written + " is no signal of this model" +
+                             (near.empty() ? "" : "; nearest: " + near.front()));
+    }
+    const plant::Unit unit = signals.signal(index).unit;
+    if (unit != quantity.unit)
+        throw InputError(scenario.path, quantity.line, quantity.column,
+                         quantity.written + " must be written with its unit: " + quantity.signal +
+                             " ends in " + suffixes_of(unit));
+}
+
+}  // namespace
+
+ScenarioFile parse_scenario(const std::string& text, const std::string& path) {
+    const YAML::Node root = parse_yaml(text, path);
+    ReadContext context{path, {}, {}};
+    ScenarioText written;
+    FieldReader reader(context, root, root.Mark(), "", "");
+    fields(reader, written);
+    reader.finish();
+
+    const std::filesystem::path place(path);
+    ScenarioFile scenario = std::move(written.file);
+    scenario.path = path;
+    scenario.text = text;
+    scenario.name = place.stem().string();
+    scenario.model_path = (place.parent_path() / written.model).lexically_normal().string();
+    scenario.timeline = by_time(written.timeline);
+    scenario.expect = expectations(path, written.expect);
+    return scenario;
+}
+
+ScenarioFile read_scenario(const std::string& path) {
+    return parse_scenario(read_text(path), path);
+}
+
+void check_signals(const ScenarioFile& scenario, const SignalTable& signals) {
+    for (const auto& speed : scenario.start.speeds)
+        check(scenario, speed.quantity, "mass." + speed.quantity.signal + ".speed", signals);
+    for (const auto& input : scenario.start.inputs)
+        check(scenario, input.quantity, input.quantity.signal, signals);
+    for (const auto& moment : scenario.timeline)
+        check(scenario, moment.setting.quantity, moment.setting.quantity.signal, signals);
+    for (const auto& bound : scenario.expect.signals)
+        check(scenario, bound.quantity, bound.quantity.signal, signals);
+}
+
+nlohmann::ordered_json scenario_schema() {
+    nlohmann::ordered_json schema = {{"$schema", "http://json-schema.org/draft-07/schema#"},
+                                     {"title", "shiftrig scenario"}};
+    schema.update(FieldSchema::of<ScenarioText>());
+    return schema;
+}
+
+}  // namespace shiftrig::io
