@@ -53,7 +53,7 @@ Response Responses::build(const Mode& mode) const {
         const auto& mesh = system_.meshes[static_cast<std::size_t>(m)];
         const auto index = static_cast<std::size_t>(m);
         const bool moves = mesh.lossy() && mode.mesh[index] != Hold::held;
-        const double loss = moves ? 1 - std::pow(mesh.efficiency, mode.x[index]) : 0;
+        const double loss = moves ? mesh.slope(mode.x[index]) : 0;
         rows.push_back({mesh.column, mesh.column + loss * mesh.loss_column, mesh_cost, m, -1, -1});
     }
     for (int f = 0; f < frictions; ++f) {
@@ -108,8 +108,7 @@ Response Responses::build(const Mode& mode) const {
         const auto index = static_cast<std::size_t>(m);
         const auto& mesh = system_.meshes[index];
         if (mesh.lossy() && mode.mesh[index] != Hold::held)
-            response.loss_torque.row(m) =
-                (1 - std::pow(mesh.efficiency, mode.x[index])) * response.mesh_torque.row(m);
+            response.loss_torque.row(m) = mesh.slope(mode.x[index]) * response.mesh_torque.row(m);
     }
     response.projector = Matrix::Identity(n, n);
     if (r > 0) {

@@ -30,7 +30,7 @@ struct Mode {
 struct Response {
     Matrix acceleration;     // ω̇ = acceleration·M̃
     Matrix mesh_torque;      // M on link 1 of every mesh
-    Matrix loss_torque;      // L of every mesh
+    Matrix loss_torque;      // L of every mesh, without s·offset(x) of the moving ones
     Matrix friction_torque;  // T of held devices, zero rows for the others
     Matrix projector;        // J-orthogonal projector of speeds onto the constraints
     int redundancy = 0;      // dependent rows among meshes and held friction devices

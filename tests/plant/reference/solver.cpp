@@ -9,13 +9,11 @@ namespace {
 
 constexpr double overload_tolerance = 1e-12;
 
-double sign_of(Hold hold) { return hold == Hold::plus ? 1 : hold == Hold::minus ? -1 : 0; }
-Hold toward(double value) { return value < 0 ? Hold::minus : Hold::plus; }
-
-// Limits of the loss torque of a mesh at rest that carries M on link 1.
-std::pair<double, double> loss_limits(const Mesh& mesh, double m) {
-    const double driven = (1 - mesh.efficiency) * m, driving = (1 - 1 / mesh.efficiency) * m;
-    return std::minmax(driven, driving);
+double sign_of(Hold hold) {
+    return hold == Hold::plus ? 1 : hold == Hold::minus ? -1 : 0;
+}
+Hold toward(double value) {
+    return value < 0 ? Hold::minus : Hold::plus;
 }
 
 }  // namespace
@@ -34,7 +32,9 @@ Solver::Solver(const System& system) : z(system.start), system_(system), respons
     extra_ = Vector::Zero(system.extras);
 }
 
-double Solver::speed_scale() const { return std::max(1.0, z.head(system_.masses).lpNorm<Eigen::Infinity>()); }
+double Solver::speed_scale() const {
+    return std::max(1.0, z.head(system_.masses).lpNorm<Eigen::Infinity>());
+}
 
 void Solver::note(double time, const std::string& device, const char* what) {
     changes.push_back({time, device, what});
@@ -50,6 +50,11 @@ void Solver::free_torque(When when, const Vector& state, const Mode& trial, Vect
         const auto& friction = system_.frictions[f];
         const double slip = friction.column.dot(state.head(system_.masses));
         out -= friction.column * (s * friction.sliding(when, state, slip));
+    }
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
+        const auto& mesh = system_.meshes[m];
+        if (mesh.lossy() && trial.mesh[m] != Hold::held)
+            out -= mesh.loss_column * (sign_of(trial.mesh[m]) * mesh.offset(trial.x[m]));
     }
 }
 
@@ -87,13 +92,18 @@ bool Solver::consistent(const Mode& trial, const Torques& torques) {
         const auto i = static_cast<Eigen::Index>(m);
         if (!mesh.lossy()) continue;
         if (trial.mesh[m] == Hold::held) {
-            const auto [low, high] = loss_limits(mesh, torques.mesh[i]);
-            if (torques.loss[i] < low - torque_tolerance || torques.loss[i] > high + torque_tolerance) return false;
+            const double high = mesh.largest_loss(torques.mesh[i]),
+                         low = -mesh.largest_loss(-torques.mesh[i]);
+            if (torques.loss[i] < low - torque_tolerance || torques.loss[i] > high + torque_tolerance)
+                return false;
             continue;
         }
         const double s = sign_of(trial.mesh[m]);
-        if (trial.x[m] * s * torques.mesh[i] < -torque_tolerance) return false;
-        if (trial.at_rest[m] && s * mesh.relative.dot(torques.acceleration) < -acceleration_tolerance(mesh.relative, torques))
+        if (mesh.efficiency * mesh.backward_efficiency < 1 &&
+            trial.x[m] * (s * torques.mesh[i] - mesh.threshold()) < -torque_tolerance)
+            return false;
+        if (trial.at_rest[m] &&
+            s * mesh.relative.dot(torques.acceleration) < -acceleration_tolerance(mesh.relative, torques))
             return false;
     }
     return true;
@@ -153,8 +163,10 @@ bool Solver::settle_meshes(When when) {
         }
         solve(when, z, trial, torques);
         if (consistent(trial, torques)) {
-            const double overload = std::max(1.0 + overload_tolerance, worst_overload(when, torques, trial, nullptr));
-            if (overload < best_overload * (1 - 1e-12) || (overload <= best_overload && differing < best_changes)) {
+            const double overload =
+                std::max(1.0 + overload_tolerance, worst_overload(when, torques, trial, nullptr));
+            if (overload < best_overload * (1 - 1e-12) ||
+                (overload <= best_overload && differing < best_changes)) {
                 best = trial;
                 best_overload = overload;
                 best_changes = differing;
@@ -194,12 +206,15 @@ void Solver::join() {
     omega = (projector * omega).eval();
     const double small = 1e-10 * speed_scale();
     const auto pinned = [&](const Vector& column) {
-        return (projector.transpose() * column).norm() < 1e-8 * column.norm() && std::abs(column.dot(omega)) < small;
+        return (projector.transpose() * column).norm() < 1e-8 * column.norm() &&
+               std::abs(column.dot(omega)) < small;
     };
     for (std::size_t f = 0; f < system_.frictions.size(); ++f)
-        if (sign_of(mode.friction[f]) != 0 && pinned(system_.frictions[f].column)) mode.friction[f] = Hold::held;
+        if (sign_of(mode.friction[f]) != 0 && pinned(system_.frictions[f].column))
+            mode.friction[f] = Hold::held;
     for (std::size_t m = 0; m < system_.meshes.size(); ++m)
-        if (system_.meshes[m].lossy() && !mode.at_rest[m] && pinned(system_.meshes[m].relative)) mode.at_rest[m] = true;
+        if (system_.meshes[m].lossy() && !mode.at_rest[m] && pinned(system_.meshes[m].relative))
+            mode.at_rest[m] = true;
 }
 
 void Solver::settle(When when) {
@@ -265,9 +280,11 @@ void Solver::margins(When when, const Vector& state, Vector& g) {
         if (mode.friction[f] == Hold::free)
             second = threshold - holding;
         else if (mode.friction[f] == Hold::held)
-            first = holding * (1 + 2 * overload_tolerance) - std::abs(work_.friction[static_cast<Eigen::Index>(f)]);
+            first = holding * (1 + 2 * overload_tolerance) -
+                    std::abs(work_.friction[static_cast<Eigen::Index>(f)]);
         else
-            first = sign_of(mode.friction[f]) * friction.column.dot(state.head(system_.masses)) + speed_tolerance;
+            first =
+                sign_of(mode.friction[f]) * friction.column.dot(state.head(system_.masses)) + speed_tolerance;
         g[i++] = first;
         g[i++] = second;
     }
@@ -276,14 +293,15 @@ void Solver::margins(When when, const Vector& state, Vector& g) {
         const auto k = static_cast<Eigen::Index>(m);
         double first = 1, second = 1;
         if (mesh.lossy() && mode.mesh[m] == Hold::held) {
-            const auto [low, high] = loss_limits(mesh, work_.mesh[k]);
+            const double high = mesh.largest_loss(work_.mesh[k]), low = -mesh.largest_loss(-work_.mesh[k]);
             first = std::min(high - work_.loss[k], work_.loss[k] - low) + torque_tolerance;
         } else if (mesh.lossy()) {
             const double s = sign_of(mode.mesh[m]);
             first = mode.at_rest[m] ? 2 * acceleration_tolerance(mesh.relative, work_) -
                                           std::abs(mesh.relative.dot(work_.acceleration))
                                     : s * mesh.relative.dot(state.head(system_.masses)) + speed_tolerance;
-            second = mode.x[m] * s * work_.mesh[k] + torque_tolerance;
+            if (mesh.efficiency * mesh.backward_efficiency < 1)
+                second = mode.x[m] * (s * work_.mesh[k] - mesh.threshold()) + torque_tolerance;
         }
         g[i++] = first;
         g[i++] = second;
@@ -307,7 +325,9 @@ void Solver::apply_violations(When when) {
     }
     const auto base = 2 * system_.frictions.size();
     for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
-        if (mode.mesh[m] == Hold::held || mode.at_rest[m] || margins_[static_cast<Eigen::Index>(base + 2 * m)] >= 0) continue;
+        if (mode.mesh[m] == Hold::held || mode.at_rest[m] ||
+            margins_[static_cast<Eigen::Index>(base + 2 * m)] >= 0)
+            continue;
         // Joined by the same projection as everything that is held now.
         mode.at_rest[m] = true;
         mode.mesh[m] = Hold::held;
@@ -329,11 +349,16 @@ Sample Solver::sample(When when) {
         const double sign = sign_of(mode.friction[f]);
         if (sign != 0) {
             const double slip = system_.frictions[f].column.dot(z.head(system_.masses));
-            s.friction_torque[static_cast<Eigen::Index>(f)] = sign * system_.frictions[f].sliding(when, z, slip);
+            s.friction_torque[static_cast<Eigen::Index>(f)] =
+                sign * system_.frictions[f].sliding(when, z, slip);
         }
     }
     s.mesh_torque = work_.mesh;
     s.loss_torque = work_.loss;
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m)
+        if (system_.meshes[m].lossy())
+            s.loss_torque[static_cast<Eigen::Index>(m)] +=
+                sign_of(mode.mesh[m]) * system_.meshes[m].offset(mode.x[m]);
     s.unique = responses_.of(mode).redundancy == 0;
     for (std::size_t m = 0; m < system_.meshes.size(); ++m)
         if (mode.at_rest[m] && mode.mesh[m] != Hold::held) s.unique = false;

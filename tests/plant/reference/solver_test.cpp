@@ -39,7 +39,9 @@ double time_of(const Result& result, const std::string& device, const std::strin
     return 0;
 }
 
-Curves data(const char* name) { return read_curves(std::string(SHIFTRIG_DATA "/") + name); }
+Curves data(const char* name) {
+    return read_curves(std::string(SHIFTRIG_DATA "/") + name);
+}
 
 // The curves were made with 2 µs steps, so that each break-away (a jump of 1 Nm on 1 kg m²) may be 1e-6 rad/s
 // off. Published event times are those of another
@@ -48,9 +50,15 @@ TEST(ReferenceSolver, FollowsCoupledClutches) {
     const Curves curves = data("CoupledClutches.csv");
     const Result result = run(cases::coupled_clutches(), 1.5);
     EXPECT_LT(worst_difference(result, curves["J1.w"], [](const Sample& s) { return s.z[0]; }), 2e-6);
-    EXPECT_LT(worst_difference(result, curves["clutch1.w_rel"], [](const Sample& s) { return s.z[1] - s.z[0]; }), 2e-6);
-    EXPECT_LT(worst_difference(result, curves["clutch2.w_rel"], [](const Sample& s) { return s.z[2] - s.z[1]; }), 2e-6);
-    EXPECT_LT(worst_difference(result, curves["clutch3.w_rel"], [](const Sample& s) { return s.z[3] - s.z[2]; }), 2e-6);
+    EXPECT_LT(
+        worst_difference(result, curves["clutch1.w_rel"], [](const Sample& s) { return s.z[1] - s.z[0]; }),
+        2e-6);
+    EXPECT_LT(
+        worst_difference(result, curves["clutch2.w_rel"], [](const Sample& s) { return s.z[2] - s.z[1]; }),
+        2e-6);
+    EXPECT_LT(
+        worst_difference(result, curves["clutch3.w_rel"], [](const Sample& s) { return s.z[3] - s.z[2]; }),
+        2e-6);
     EXPECT_NEAR(result.samples.back().z.head(4).sum(), 10 + 2 / std::numbers::pi, 1e-11);
     EXPECT_NEAR(time_of(result, "clutch2", "locks"), 0.7096215, 1e-7);
     // Until clutch 1 locks, ω1 = 10 + (1 − cos 10πt)/π − (25/π) sin 0.4πt and ω2 = ω3 = (12.5/π) sin 0.4πt.
@@ -80,9 +88,14 @@ TEST(ReferenceSolver, FollowsFriction) {
     const Curves curves = data("Friction.csv");
     const Result result = run(cases::friction(), 3.0);
     EXPECT_LT(worst_difference(result, curves["inertia3.w"], [](const Sample& s) { return s.z[0]; }), 6e-5);
-    EXPECT_LT(worst_difference(result, curves["clutch.w_rel"], [](const Sample& s) { return s.z[1] - s.z[0]; }), 1.2e-4);
-    EXPECT_LT(worst_difference(result, curves["spring.w_rel"], [](const Sample& s) { return s.z[2] - s.z[1]; }), 1.2e-4);
-    for (std::size_t i = 0; i < 500; ++i) ASSERT_NEAR(result.samples[i].z[0], curves["inertia3.w"][i], 6e-7) << i;
+    EXPECT_LT(
+        worst_difference(result, curves["clutch.w_rel"], [](const Sample& s) { return s.z[1] - s.z[0]; }),
+        1.2e-4);
+    EXPECT_LT(
+        worst_difference(result, curves["spring.w_rel"], [](const Sample& s) { return s.z[2] - s.z[1]; }),
+        1.2e-4);
+    for (std::size_t i = 0; i < 500; ++i)
+        ASSERT_NEAR(result.samples[i].z[0], curves["inertia3.w"][i], 6e-7) << i;
     EXPECT_NEAR(time_of(result, "clutch", "locks", 3), 1.6636398, 2e-6);
 }
 
@@ -111,8 +124,13 @@ TEST(ReferenceSolver, SharesParallelClutchesByCapacity) {
     plant::Description d;
     d.masses = {{.name = "a", .inertia = 1}, {.name = "b", .inertia = 3}};
     for (const double capacity : {10.0, 30.0}) {
-        plant::Clutch clutch{.name = capacity < 20 ? "small" : "large", .a = "a", .b = "b", .friction = plant::DryFriction{.sliding_capacity = capacity},
-                             .actuation = plant::ActuationConstant{}, .heat = {}};
+        plant::Clutch clutch{
+            .name = capacity < 20 ? "small" : "large",
+            .a = "a",
+            .b = "b",
+            .friction = plant::DryFriction{.sliding_capacity = capacity, .factor_over_slip = {}},
+            .actuation = plant::ActuationConstant{},
+            .heat = {}};
         clutch.initially_locked = true;
         d.clutches.push_back(clutch);
     }

@@ -8,12 +8,26 @@
 namespace shiftrig::reference {
 namespace {
 
-Vector unit(int size, int i) { return Vector::Unit(size, i); }
+Vector unit(int size, int i) {
+    return Vector::Unit(size, i);
+}
 
 void collect_breaks(const plant::Waveform& waveform, std::vector<double>& breaks) {
     for (const auto& piece : waveform.pieces)
         for (const double time : {piece.from, piece.until})
             if (time > 0 && time < 1e9) breaks.push_back(time);
+}
+
+double slip_factor(const plant::DryFriction& law, double slip) {
+    const auto& table = law.factor_over_slip;
+    if (table.empty())
+        return law.falling > 0 ? 1 - law.falling * (1 - std::exp(-slip / law.falling_speed)) : 1;
+    if (table.size() == 1 || slip <= table.front().first) return table.front().second;
+    std::size_t right = 1;
+    while (right + 1 < table.size() && table[right].first < slip) ++right;
+    const auto& [x0, y0] = table[right - 1];
+    const auto& [x1, y1] = table[right];
+    return y0 + (y1 - y0) * (slip - x0) / (x1 - x0);
 }
 
 Friction friction_of(const plant::Clutch& clutch, const System& system) {
@@ -25,7 +39,8 @@ Friction friction_of(const plant::Clutch& clutch, const System& system) {
     result.name = clutch.name;
     result.column = unit(system.masses, system.mass(clutch.a));
     if (!clutch.b.empty())
-        result.column -= unit(system.masses, system.mass(clutch.b)) / (clutch.radius > 0 ? clutch.radius : 1.0);
+        result.column -=
+            unit(system.masses, system.mass(clutch.b)) / (clutch.radius > 0 ? clutch.radius : 1.0);
     result.nominal = law->sliding_capacity;
     result.initially_held = clutch.initially_locked;
     const plant::Waveform profile = direct ? direct->profile : plant::Waveform{};
@@ -34,8 +49,7 @@ Friction friction_of(const plant::Clutch& clutch, const System& system) {
         return profile.pieces.empty() ? constant : std::max(0.0, evaluate(profile, when));
     };
     result.sliding = [law = *law, engagement](When when, const Vector&, double slip) {
-        const double fall = law.falling > 0 ? 1 - law.falling * (1 - std::exp(-std::abs(slip) / law.falling_speed)) : 1;
-        return law.sliding_capacity * engagement(when) * fall;
+        return law.sliding_capacity * engagement(when) * slip_factor(law, std::abs(slip));
     };
     result.holding = [law = *law, engagement](When when, const Vector&) {
         return law.static_ratio * law.sliding_capacity * engagement(when);
@@ -51,7 +65,8 @@ double evaluate(const plant::Waveform& waveform, When when) {
         if (when.inside < p.from || when.inside >= p.until) continue;
         sum += p.offset;
         if (p.slope != 0) sum += p.slope * (when.t - p.from);
-        if (p.amplitude != 0) sum += p.amplitude * std::sin(2 * std::numbers::pi * p.frequency * (when.t - p.phase_time));
+        if (p.amplitude != 0)
+            sum += p.amplitude * std::sin(2 * std::numbers::pi * p.frequency * (when.t - p.phase_time));
     }
     return sum;
 }
@@ -96,35 +111,34 @@ System::System(const plant::Description& d) {
         if (const auto* direct = std::get_if<plant::ActuationDirect>(&clutch.actuation))
             collect_breaks(direct->profile, breaks);
     }
-    const auto add_mesh = [this](const std::string& name, bool planetary, double u, double eta, int one, int two, int carrier) {
+    const auto add_mesh = [this](const std::string& name, double u, double eta, int one, int two,
+                                 int carrier) {
         const Vector housing = Vector::Zero(masses);
         const Vector c = carrier < 0 ? housing : unit(masses, carrier);
-        Mesh mesh{name, planetary, u, eta, {}, {}, {}};
+        Mesh mesh;
+        mesh.name = name;
+        mesh.ratio = u;
+        mesh.efficiency = mesh.backward_efficiency = eta;
         mesh.relative = unit(masses, one) - c;
         mesh.loss_column = u * (unit(masses, two) - c);
         mesh.column = mesh.relative - mesh.loss_column;  // Willis: (ω1 − ωc) − u (ω2 − ωc) = 0
         meshes.push_back(mesh);
     };
     for (const auto& g : d.gears) {
-        add_mesh(g.name, false, g.ratio, g.efficiency, mass(g.a), mass(g.b), -1);
-        if (g.bearing_torque <= 0) continue;
-        Friction bearing;
-        bearing.name = g.name + ".bearing";
-        bearing.column = unit(masses, mass(g.a));
-        bearing.nominal = g.bearing_torque;
-        bearing.bearing = true;
-        bearing.sliding = [b = g.bearing_torque](When, const Vector&, double) { return b; };
-        bearing.holding = [b = g.bearing_torque](When, const Vector&) { return b; };
-        frictions.push_back(bearing);
+        add_mesh(g.name, g.ratio, g.efficiency, mass(g.a), mass(g.b), -1);
+        meshes.back().bearing = meshes.back().backward_bearing = g.bearing_torque;
+        if (g.backward_efficiency > 0) meshes.back().backward_efficiency = g.backward_efficiency;
+        if (g.backward_bearing_torque >= 0) meshes.back().backward_bearing = g.backward_bearing_torque;
     }
     for (const auto& p : d.planetaries)
-        add_mesh(p.name, true, p.ratio, p.efficiency, mass(p.sun), mass(p.ring), mass(p.carrier));
+        add_mesh(p.name, p.ratio, p.efficiency, mass(p.sun), mass(p.ring), mass(p.carrier));
     for (const auto& s : d.sources) {
         sources.push_back(s);
         source_mass.push_back(mass(s.mass));
         collect_breaks(s.waveform, breaks);
     }
-    if (!d.tyres.empty() || !d.converters.empty() || !d.engines.empty() || !d.roads.empty() || !d.ploughs.empty())
+    if (!d.tyres.empty() || !d.converters.empty() || !d.engines.empty() || !d.roads.empty() ||
+        !d.ploughs.empty())
         throw std::invalid_argument("reference: a law it does not know; add it through System::law");
     std::sort(breaks.begin(), breaks.end());
     breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());

@@ -4,8 +4,10 @@
 // State z = [ω (one per mass); φ (one per shaft); extra (states of added laws)]. Two kinds of devices
 // can hold their parts together:
 //   Friction  slip w = columnᵀω, torque T on the first link, masses feel −column·T
-//   Mesh      gear or row: columnᵀω = 0 always, torque M on link 1, masses feel −column·M − loss_column·L,
-//             L the loss torque: (1 − η^x)·M while it moves, anything between its two limits at rest
+//   Mesh      gear or row: columnᵀω = 0 always, torque M on link 1, masses feel −column·M − loss_column·L.
+//             L is the loss torque: with s the sign of the relative motion s·f(s·M) while it moves, where
+//             f(m) = (1 − η)·m + b if link 1 drives, (1 − 1/η')·m + b' if it is driven; at rest anything
+//             between −f(−M) and f(M)
 #pragma once
 
 #include <Eigen/Dense>
@@ -32,7 +34,6 @@ struct Friction {
     std::string name;
     Vector column;
     double nominal = 0;  // [Nm] weight of the device where a torque split is not unique
-    bool bearing = false;
     bool initially_held = false;
     // Capacities [Nm] ≥ 0; sliding depends on |slip|.
     std::function<double(When, const Vector& z, double slip)> sliding;
@@ -41,12 +42,28 @@ struct Friction {
 
 struct Mesh {
     std::string name;
-    bool planetary = false;
-    double ratio = 0, efficiency = 1;
-    Vector column;       // kinematics
-    Vector relative;     // ω_1 − ω_carrier = relativeᵀω
-    Vector loss_column;  // ratio·(e_2 − e_carrier)
-    bool lossy() const { return efficiency < 1; }
+    double ratio = 0;
+    double efficiency = 1, backward_efficiency = 1;  // η, η'
+    double bearing = 0, backward_bearing = 0;        // b, b' [Nm]
+    Vector column;                                   // kinematics
+    Vector relative;                                 // ω_1 − ω_carrier = relativeᵀω
+    Vector loss_column;                              // ratio·(e_2 − e_carrier)
+
+    bool lossy() const {
+        return efficiency < 1 || backward_efficiency < 1 || bearing > 0 || backward_bearing > 0;
+    }
+    // L = slope(x)·M + s·offset(x); x = +1 where link 1 drives, −1 where it is driven.
+    double slope(int x) const { return 1 - (x > 0 ? efficiency : 1 / backward_efficiency); }
+    double offset(int x) const { return x > 0 ? bearing : backward_bearing; }
+    // s·M at which both branches of f meet: x = sign(s·M − threshold).
+    double threshold() const {
+        const double difference = efficiency - 1 / backward_efficiency;
+        return difference == 0 ? 0.0 : (bearing - backward_bearing) / difference;
+    }
+    double largest_loss(double m) const {  // f(m)
+        const int x = m >= threshold() ? 1 : -1;
+        return slope(x) * m + offset(x);
+    }
 };
 
 struct System {
@@ -58,7 +75,7 @@ struct System {
     Vector inertia;
     Matrix shaft_columns;  // masses × shafts
     Vector stiffness, damping;
-    Matrix damper;         // M̃ −= damper·ω
+    Matrix damper;  // M̃ −= damper·ω
     std::vector<Friction> frictions;
     std::vector<Mesh> meshes;
     std::vector<plant::TorqueSource> sources;
