@@ -1,0 +1,77 @@
+// Gears and natural frequencies of a machine: what `check` shows an engineer before anything turns.
+//
+//     J-orthonormal motions Q of the closed set:  q̈ + Qᵀ A_E D A_Eᵀ Q q̇ + Qᵀ A_E K A_Eᵀ Q q = 0
+//
+//   A_E   columns of shafts, dampers and tyres          1
+//   K, D  their stiffness and damping                   Nm/rad, Nm s/rad
+//   tyre  k = dF/dκ · r²/σ between wheel and body, the relaxed Brixius tyre at standstill (laws/tyre.h); damping k τ.
+//         At a body speed V its twist leaks with the rate V/σ (damped modes only).
+//
+// Closed clutches and brakes are rigid, open ones transmit nothing; wheel contacts ([Algin] Fw) count as closed.
+// Linear in small motion: no backlash, no friction, loss-free meshes, converters and engines without stiffness.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plant/description.h"
+#include "plant/rigid_set.h"
+
+namespace shiftrig::plant {
+
+// ---- gears ----------------------------------------------------------------------------------------
+
+// One row of the gear table: a gear path with one choice of every selectable ratio, "F2/M".
+struct GearVariant {
+    std::string name;
+    std::vector<std::string> closed;
+    std::vector<std::pair<std::string, std::string>> options;  // gear, option: ("range", "M")
+    Description description;                                   // with these ratios in use
+    std::optional<double>
+        ratio;  // ω_input / ω_output (at a translating output: of its wheel); none: not driven
+    std::optional<double> metres_per_radian;  // travel of the driven body per radian of the input, no slip
+    std::vector<TieUp> tie_ups;
+    double kmh(double input_rpm) const noexcept;  // 0 without a body
+};
+
+// Every gear path times every combination of options; throws ModelError where a path names no clutch or brake.
+std::vector<GearVariant> gear_variants(const Description& description);
+
+// ---- natural frequencies ----------------------------------------------------------------------------
+
+struct Mode {
+    double frequency = 0;               // undamped [Hz]
+    double damping_ratio = 0;           // first order: modal damping / critical, shafts, dampers and tyres
+    std::vector<double> shape;          // speed of every mass; 1 at the mass with the largest kinetic share
+    std::vector<double> kinetic_share;  // of every mass in the kinetic energy, sums to 1
+    std::vector<std::pair<std::string, double>>
+        elastic_share;  // of every shaft and tyre in the potential energy
+};
+
+struct DampedMode {
+    double frequency = 0;      // |λ|/2π [Hz]
+    double damping_ratio = 0;  // −Re λ/|λ|
+};
+
+struct ModalResult {
+    int rigid_motions = 0;           // motions without stiffness
+    std::vector<Mode> modes;         // rising frequency
+    std::vector<DampedMode> damped;  // oscillating ones of the damped system, rising frequency
+};
+
+struct ModalOptions {
+    double body_speed = 0;  // V for the damped modes [m/s]
+};
+
+ModalResult natural_modes(const Description& description, const std::vector<std::string>& closed,
+                          const ModalOptions& options = {});
+
+// ---- warnings ---------------------------------------------------------------------------------------
+
+// What a careful engineer would like to hear about his model, one sentence each: efficiencies below 0.5 (loss directions
+// need not be unique), inertia ratios beyond 1e7, modes that the engine's third order meets between idle and high idle.
+std::vector<std::string> model_warnings(const Description& description);
+
+}  // namespace shiftrig::plant
