@@ -39,7 +39,6 @@ using Choices = std::vector<std::pair<const char*, Value>>;
 // What all readers of one file share.
 struct ReadContext {
     std::string path;
-    std::vector<std::string> masses;  // that links may name
     std::vector<Place> places;
 };
 
@@ -55,8 +54,8 @@ class FieldReader {
           at_(at),
           entries_(entries(context.path, map, at, owner() + prefix_dotless())) {
         for (const auto& entry : entries_)
-            context_.places.push_back(
-                {kind_, device_, prefix_ + entry.key, entry.mark.line + 1, entry.mark.column + 1});
+            context_.places.push_back({kind_, device_, prefix_ + entry.key, as_written(entry.value),
+                                       entry.mark.line + 1, entry.mark.column + 1});
     }
 
     // ---- numbers, flags, words -----------------------------------------------------------------------
@@ -99,15 +98,14 @@ class FieldReader {
     }
 
     // ---- links and names -----------------------------------------------------------------------------
+    // Whether the mass exists is plant::validate's to say: it knows the regularity rule.
     void link(const char* key, std::string& value, const char*) {
-        if (const Entry* entry = required(key)) value = mass(*entry, key, word(*entry, key));
+        if (const Entry* entry = required(key)) value = word(*entry, key);
     }
     // A mass, or the word housing, which becomes the empty name.
     void link_or_housing(const char* key, std::string& value, const char*) {
-        const Entry* entry = required(key);
-        if (!entry) return;
-        value = word(*entry, key);
-        value = value == "housing" ? "" : mass(*entry, key, value);
+        if (const Entry* entry = required(key)) value = word(*entry, key);
+        if (value == "housing") value.clear();
     }
     void names(const char* key, std::vector<std::string>& values, const char*) {
         if (const Entry* entry = required(key)) read_names(*entry, key, values);
@@ -128,25 +126,11 @@ class FieldReader {
     // [[x, y], …], x rising; the units of both columns stand in the key, their factors are given here.
     void table(const char* key, std::vector<std::pair<double, double>>& points, double x_factor,
                double y_factor, const char*) {
-        const Entry* entry = required(key);
-        if (!entry) return;
-        if (!entry->value.IsSequence() || entry->value.size() < 2)
-            refuse(*entry, key, "must be a list of at least two pairs [x, y]");
-        for (const auto& row : entry->value) {
-            std::pair<double, double> point;
-            if (!row.IsSequence() || row.size() != 2 || !YAML::convert<double>::decode(row[0], point.first) ||
-                !YAML::convert<double>::decode(row[1], point.second) || !rules::any.holds(point.first) ||
-                !rules::any.holds(point.second))
-                fail(
-                    context_.path, row.Mark(),
-                    owner() + prefix_ + key + " = " + as_written(row) + "; must be a pair of numbers [x, y]");
-            point.first *= x_factor;
-            point.second *= y_factor;
-            if (!points.empty() && point.first <= points.back().first)
-                fail(context_.path, row.Mark(),
-                     owner() + prefix_ + key + " = " + as_written(row) + "; x must rise from pair to pair");
-            points.push_back(point);
-        }
+        if (const Entry* entry = required(key)) read_table(*entry, key, points, x_factor, y_factor);
+    }
+    void optional_table(const char* key, std::vector<std::pair<double, double>>& points, double x_factor,
+                        double y_factor, const char*) {
+        if (const Entry* entry = take(key)) read_table(*entry, key, points, x_factor, y_factor);
     }
     // {name: number, …}
     void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values, const Rule& rule,
@@ -194,7 +178,7 @@ class FieldReader {
             if (item.key.empty() || item.key.find_first_not_of(name_letters) != std::string::npos)
                 fail(context_.path, item.mark,
                      std::string(kind) + " \"" + item.key + "\": a name is made of letters, digits and _");
-            context_.places.push_back({kind, item.key, "", item.mark.line + 1, item.mark.column + 1});
+            context_.places.push_back({kind, item.key, "", "", item.mark.line + 1, item.mark.column + 1});
             Struct& value = values.emplace_back();
             value.name = item.key;
             FieldReader inner(context_, item.value, item.mark, kind, item.key);
@@ -306,10 +290,25 @@ class FieldReader {
         if (!entry.value.IsScalar() || entry.value.Scalar().empty()) refuse(entry, key, "must be a word");
         return entry.value.Scalar();
     }
-    std::string mass(const Entry& entry, const std::string& key, const std::string& name) const {
-        if (std::find(context_.masses.begin(), context_.masses.end(), name) == context_.masses.end())
-            refuse(entry, key, "must name a mass" + nearest_hint(name, context_.masses));
-        return name;
+    void read_table(const Entry& entry, const char* key, std::vector<std::pair<double, double>>& points,
+                    double x_factor, double y_factor) const {
+        if (!entry.value.IsSequence() || entry.value.size() < 2)
+            refuse(entry, key, "must be a list of at least two pairs [x, y]");
+        for (const auto& row : entry.value) {
+            std::pair<double, double> point;
+            if (!row.IsSequence() || row.size() != 2 || !YAML::convert<double>::decode(row[0], point.first) ||
+                !YAML::convert<double>::decode(row[1], point.second) || !rules::any.holds(point.first) ||
+                !rules::any.holds(point.second))
+                fail(
+                    context_.path, row.Mark(),
+                    owner() + prefix_ + key + " = " + as_written(row) + "; must be a pair of numbers [x, y]");
+            point.first *= x_factor;
+            point.second *= y_factor;
+            if (!points.empty() && point.first <= points.back().first)
+                fail(context_.path, row.Mark(),
+                     owner() + prefix_ + key + " = " + as_written(row) + "; x must rise from pair to pair");
+            points.push_back(point);
+        }
     }
     void read_names(const Entry& entry, const char* key, std::vector<std::string>& values) const {
         if (!entry.value.IsSequence()) refuse(entry, key, "must be a list of names");

@@ -57,9 +57,11 @@ class FieldSchema {
     }
 
     void table(const char* key, std::vector<std::pair<double, double>>&, double, double, const char* text) {
-        const json pair = {
-            {"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}};
-        require(key, {{"type", "array"}, {"items", pair}, {"minItems", 2}}, text);
+        require(key, pairs(), text);
+    }
+    void optional_table(const char* key, std::vector<std::pair<double, double>>&, double, double,
+                        const char* text) {
+        add(key, pairs(), text);
     }
     void named_numbers(const char* key, std::vector<std::pair<std::string, double>>&, const Rule& rule,
                        const char* text) {
@@ -127,6 +129,11 @@ class FieldSchema {
 
   private:
     static json word() { return {{"type", "string"}, {"minLength", 1}}; }
+    static json pairs() {
+        const json pair = {
+            {"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}};
+        return {{"type", "array"}, {"items", pair}, {"minItems", 2}};
+    }
     static json bounded(const char* type, const Rule& rule) {
         json result = {{"type", type}};
         if (std::isfinite(rule.minimum))

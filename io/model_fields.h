@@ -93,13 +93,15 @@ void fields(Fields& f, plant::Waveform::Piece& p) {
 
 template <class Fields>
 void fields(Fields& f, plant::DryFriction& d) {
-    f.number("sliding_capacity_nm", d.sliding_capacity, not_negative,
+    f.number("sliding_capacity_nm", d.sliding_capacity, positive,
              "friction torque while slipping, fully engaged (N for translating masses)");
     f.number("static_ratio", d.static_ratio, at_least_one, "static over sliding capacity");
-    f.optional_number("falling", d.falling, fraction,
+    f.optional_number("falling", d.falling, at_most_one,
                       "share of the sliding capacity lost at high slip: factor 1 − falling·(1 − "
                       "e^(−|Δω|/falling_speed)) [0]");
     f.optional_number("falling_speed_rad_s", d.falling_speed, positive, "slip speed of that fall [1]");
+    f.optional_table("factor_over_slip_rad_s", d.factor_over_slip, 1, 1,
+                     "instead: [[rad/s, factor of sliding_capacity], …], piecewise linear");
 }
 
 template <class Fields>
@@ -237,6 +239,10 @@ void fields(Fields& f, plant::Gear& g) {
     f.number("efficiency", g.efficiency, efficiency, "of the mesh; 1: no losses");
     f.optional_number("bearing_torque_nm", g.bearing_torque, not_negative,
                       "load-independent friction on a [0]");
+    f.optional_number("backward_efficiency", g.backward_efficiency, efficiency,
+                      "where b drives [as efficiency]");
+    f.optional_number("backward_bearing_torque_nm", g.backward_bearing_torque, not_negative,
+                      "where b drives [as bearing_torque]");
 }
 
 template <class Fields>
@@ -410,7 +416,7 @@ void fields(Fields& f, ModelText& model) {
     f.section("dampers", "damper", d.dampers, "between masses or to the housing");
     f.section("clutches", "clutch", d.clutches, "clutches, brakes, Coulomb wheel contacts");
     f.section("gears", "gear", d.gears, "fixed-axis gears, range groups");
-    f.section("planetaries", "planetary", d.planetaries, "planetary rows");
+    f.section("planetaries", "planetary row", d.planetaries, "planetary rows");
     f.section("tyres", "tyre", d.tyres, "Brixius traction with relaxation");
     f.section("converters", "converter", d.converters, "torque converters");
     f.section("engines", "engine", d.engines, "diesel engines");

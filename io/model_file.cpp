@@ -6,6 +6,7 @@
 #include "io/field_reader.h"
 #include "io/field_schema.h"
 #include "io/model_fields.h"
+#include "plant/validation.h"
 
 namespace shiftrig::io {
 
@@ -23,7 +24,6 @@ class ModelReader {
 
     ModelFile read() {
         const YAML::Node root = parse_yaml(file_.text, file_.path);
-        note_masses(root);
         FieldReader reader(context_, root, root.Mark(), "", "");
         fields(reader, model_);
         reader.finish();
@@ -32,23 +32,21 @@ class ModelReader {
         file_.places = std::move(context_.places);
         file_.can = model_.can;
         for (const auto& clutch : file_.description.clutches) clutches_.push_back(clutch.name);
+        for (const auto& mass : file_.description.masses) masses_.push_back(mass.name);
         check_options();
         take_gear_paths();
         take_controller();
         check_mass("input_mass", file_.description.input_mass);
         check_mass("output_mass", file_.description.output_mass);
+        try {
+            plant::validate(file_.description);
+        } catch (const plant::ModelError& error) {
+            throw located(file_, error);
+        }
         return std::move(file_);
     }
 
   private:
-    // Links may name masses that stand further down in the file.
-    void note_masses(const YAML::Node& root) {
-        for (const auto& top : entries(file_.path, root, root.Mark(), ""))
-            if (top.key == "masses")
-                for (const auto& mass : entries(file_.path, top.value, top.mark, "masses "))
-                    context_.masses.push_back(mass.key);
-    }
-
     [[noreturn]] void refuse(const std::string& kind, const std::string& device, const std::string& key,
                              const std::string& what) const {
         const std::string owner = device.empty() ? "" : kind + " \"" + device + "\": ";
@@ -73,11 +71,9 @@ class ModelReader {
     }
 
     void check_mass(const char* key, const std::string& name) const {
-        if (!name.empty() &&
-            std::find(context_.masses.begin(), context_.masses.end(), name) == context_.masses.end())
-            refuse(
-                "", "", key,
-                std::string(key) + " = " + name + "; must name a mass" + nearest_hint(name, context_.masses));
+        if (!name.empty() && std::find(masses_.begin(), masses_.end(), name) == masses_.end())
+            refuse("", "", key,
+                   std::string(key) + " = " + name + "; must name a mass" + nearest_hint(name, masses_));
     }
 
     void take_gear_paths() {
@@ -142,7 +138,7 @@ class ModelReader {
     ModelFile file_;
     ModelText model_;
     ReadContext context_;
-    std::vector<std::string> clutches_;
+    std::vector<std::string> masses_, clutches_;
 };
 
 // A ModelError's field is a member of plant/description.h; the key is that name with its unit.
@@ -162,26 +158,35 @@ ModelFile read_model(const std::string& path) {
     return parse_model(read_text(path), path);
 }
 
-plant::Model build_model(const ModelFile& file, const plant::BuildOptions& options) {
-    try {
-        return plant::Model::build(file.description, options);
-    } catch (const plant::ModelError& error) {
-        // The longest key that fits is the most specific one; the device's own line where none fits.
-        const Place* best = nullptr;
-        for (const auto& place : file.places) {
-            if (place.device != error.device) continue;
-            const bool fits =
-                place.key.empty() || (!error.field.empty() && names_field(place.key, error.field));
-            const bool same_kind = place.kind == error.kind;
-            if (fits && (!best || (same_kind && place.key.size() >= best->key.size()))) best = &place;
-        }
-        const std::string owner =
-            error.device.empty() ? error.kind : error.kind + " \"" + error.device + "\"";
-        const std::string what = (owner.empty() ? "" : owner + ": ") +
-                                 (best && !best->key.empty() ? best->key : error.field) +
-                                 (error.field.empty() ? "" : " ") + error.rule;
-        throw InputError(file.path, best ? best->line : 0, best ? best->column : 0, what);
+InputError located(const ModelFile& file, const plant::ModelError& error) {
+    // What plant/ calls the machine or its oil stands at the top of the file; a brake stands among the clutches.
+    const bool top = error.kind == "model" || error.kind == "oil";
+    const std::string kind = top ? "" : error.kind == "brake" ? "clutch" : error.kind;
+    const std::string device = top ? "" : error.device;
+
+    const Place* place = nullptr;  // the key where one fits, else the device's own line
+    for (const auto& candidate : file.places) {
+        if (candidate.kind != kind || candidate.device != device) continue;
+        if (candidate.key.empty() ? !place : !error.field.empty() && names_field(candidate.key, error.field))
+            place = &candidate;
     }
+    std::string what = top ? "" : error.kind + " \"" + error.device + "\": ";
+    std::string rule = error.rule;
+    if (place && !place->key.empty()) {
+        what += place->key + " ";
+        // plant/ speaks SI; the user shall read what he wrote.
+        if (const auto end = rule.find(';'); rule.starts_with("= ") && end != std::string::npos)
+            rule = "= " + place->written + rule.substr(end);
+    } else if (!error.field.empty()) {
+        what += error.field + " ";
+    }
+    if (rule.ends_with("is not a mass") && place) {
+        std::vector<std::string> masses;
+        for (const auto& mass : file.description.masses) masses.push_back(mass.name);
+        rule += nearest_hint(place->written, masses);
+    }
+    return place ? InputError(file.path, place->line, place->column, what + rule)
+                 : InputError(file.path, 1, 1, what + rule);
 }
 
 void select_option(plant::Description& description, const std::string& gear, const std::string& option) {

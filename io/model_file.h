@@ -40,7 +40,9 @@ struct ControllerSide {
 
 // Where in the file a device and its keys stand, for errors found after reading.
 struct Place {
-    std::string kind, device, key;  // kind as plant::ModelError names it; key empty: the device itself
+    std::string kind, device,
+        key;              // "gear", "P1", "efficiency"; key empty: the device itself; no device: the file
+    std::string written;  // the value as it stands there
     int line = 0, column = 0;
 };
 
@@ -58,7 +60,10 @@ struct ModelFile {
 ModelFile read_model(const std::string& path);
 ModelFile parse_model(const std::string& text, const std::string& path);
 
-// plant::Model::build, with its ModelError turned into an InputError that names file, line and column.
+// The line for an error that plant/ found in the file's description.
+InputError located(const ModelFile& file, const plant::ModelError& error);
+
+// plant::Model::build with its errors located.
 plant::Model build_model(const ModelFile& file, const plant::BuildOptions& options = {});
 
 // Puts a gear's named option in use, such as range "M" of gear "range"; throws std::invalid_argument

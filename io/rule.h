@@ -27,6 +27,7 @@ inline constexpr Rule any{};
 inline constexpr Rule positive{0, unbounded, true, false};
 inline constexpr Rule not_negative{0};
 inline constexpr Rule at_least_one{1};
+inline constexpr Rule at_most_one{-unbounded, 1};
 inline constexpr Rule not_zero{-unbounded, unbounded, false, true};
 inline constexpr Rule fraction{0, 1};
 inline constexpr Rule efficiency{0, 1, true, false};

@@ -76,7 +76,7 @@ void check(const ScenarioFile& scenario, const NamedQuantity& quantity, const st
 
 ScenarioFile parse_scenario(const std::string& text, const std::string& path) {
     const YAML::Node root = parse_yaml(text, path);
-    ReadContext context{path, {}, {}};
+    ReadContext context{path, {}};
     ScenarioText written;
     FieldReader reader(context, root, root.Mark(), "", "");
     fields(reader, written);

@@ -1,16 +1,20 @@
 #include "io/yaml_document.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <sstream>
 
 namespace shiftrig::io {
 
 std::string read_text(const std::string& path) {
+    errno = 0;
     std::ifstream file(path, std::ios::binary);
     std::ostringstream text;
-    if (!file || !(text << file.rdbuf()))
-        throw InputError(path, 0, 0, "cannot be read (no such file, a folder, empty, or no permission)");
+    if (file && file.peek() != std::ifstream::traits_type::eof()) text << file.rdbuf();
+    if (!file && errno != 0)
+        throw InputError(path, 0, 0, std::string("cannot be read: ") + std::strerror(errno));
     return text.str();
 }
 
@@ -30,7 +34,10 @@ YAML::Node parse_yaml(const std::string& text, const std::string& path) {
 
 std::vector<Entry> entries(const std::string& path, const YAML::Node& map, const YAML::Mark& at,
                            const std::string& owner) {
-    if (!map.IsMap()) fail(path, at, owner + "= " + as_written(map) + "; must be a map of key: value");
+    if (!map.IsMap())
+        fail(
+            path, at,
+            (owner.empty() ? "the file " : owner) + "= " + as_written(map) + "; must be a map of key: value");
     std::vector<Entry> own, merged;
     const auto holds = [](const std::vector<Entry>& list, const std::string& key) {
         return std::any_of(list.begin(), list.end(), [&](const Entry& entry) { return entry.key == key; });

@@ -1,0 +1,6 @@
+foreach(subject model_file scenario_file schema)
+  add_executable(${subject}_test ${CMAKE_CURRENT_LIST_DIR}/${subject}_test.cpp)
+  target_compile_definitions(${subject}_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  target_link_libraries(${subject}_test PRIVATE shiftrig_model GTest::gtest_main)
+  gtest_discover_tests(${subject}_test)
+endforeach()
