@@ -49,14 +49,22 @@ class Parser {
     using Handler = void (Parser::*)();
     static const std::map<std::string, Handler, std::less<>>& handlers() {
         static const std::map<std::string, Handler, std::less<>> table{
-            {"VERSION", &Parser::version},         {"NS_", &Parser::new_symbols},
-            {"BS_", &Parser::bit_timing},          {"BU_", &Parser::nodes},
-            {"BO_", &Parser::message},             {"SG_", &Parser::signal},
-            {"VAL_TABLE_", &Parser::value_table},  {"BO_TX_BU_", &Parser::transmitters},
-            {"EV_", &Parser::environment},         {"SIG_GROUP_", &Parser::signal_group},
-            {"SIG_VALTYPE_", &Parser::value_type}, {"SG_MUL_VAL_", &Parser::multiplexed_by},
-            {"CM_", &Parser::comment},             {"BA_DEF_", &Parser::attribute_definition},
-            {"BA_", &Parser::attribute},           {"BA_DEF_DEF_", &Parser::attribute_default},
+            {"VERSION", &Parser::version},
+            {"NS_", &Parser::new_symbols},
+            {"BS_", &Parser::bit_timing},
+            {"BU_", &Parser::nodes},
+            {"BO_", &Parser::message},
+            {"SG_", &Parser::signal},
+            {"VAL_TABLE_", &Parser::value_table},
+            {"BO_TX_BU_", &Parser::transmitters},
+            {"EV_", &Parser::environment},
+            {"SIG_GROUP_", &Parser::signal_group},
+            {"SIG_VALTYPE_", &Parser::value_type},
+            {"SG_MUL_VAL_", &Parser::multiplexed_by},
+            {"CM_", &Parser::comment},
+            {"BA_DEF_", &Parser::attribute_definition},
+            {"BA_", &Parser::attribute},
+            {"BA_DEF_DEF_", &Parser::attribute_default},
             {"VAL_", &Parser::value_names}};
         return table;
     }
@@ -167,9 +175,9 @@ class Parser {
             scan_.fail_at(signal.line, "signal " + message.name + "." + signal.name + ": factor 0");
         if (*current_ != kIndependentSignals && !fits(signal, message.length))
             scan_.fail_at(signal.line, "signal " + message.name + "." + signal.name + ": bits " +
-                                           std::to_string(signal.start_bit) + "|" + std::to_string(signal.length) +
-                                           " reach beyond the message's " + std::to_string(message.length) +
-                                           " bytes");
+                                           std::to_string(signal.start_bit) + "|" +
+                                           std::to_string(signal.length) + " reach beyond the message's " +
+                                           std::to_string(message.length) + " bytes");
         message.signals.push_back(std::move(signal));
     }
 
@@ -179,7 +187,8 @@ class Parser {
         if (rest.starts_with('m')) {
             std::uint64_t value = 0;
             const auto [end, error] = std::from_chars(rest.data() + 1, rest.data() + rest.size(), value);
-            if (error != std::errc{}) scan_.fail("multiplexing mark \"" + mark + "\" must be M, m<number> or m<number>M");
+            if (error != std::errc{})
+                scan_.fail("multiplexing mark \"" + mark + "\" must be M, m<number> or m<number>M");
             signal.selected_by.emplace_back(value, value);
             rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
         }
@@ -190,7 +199,8 @@ class Parser {
     }
 
     void receivers(Signal& signal) {
-        for (std::string name = scan_.peek_word(); !name.empty() && !scan_.at_line_start(); name = scan_.peek_word()) {
+        for (std::string name = scan_.peek_word(); !name.empty() && !scan_.at_line_start();
+             name = scan_.peek_word()) {
             if (name != "Vector__XXX") signal.receivers.push_back(name);
             scan_.word();
             scan_.accept(',');
@@ -214,8 +224,8 @@ class Parser {
         if (type != 0) signal->type = type == 1 ? ValueType::float32 : ValueType::float64;
         if (type == 3) scan_.fail_at(line, "value type 3 is not defined");
         if (type != 0 && signal->length != (type == 1 ? 32 : 64))
-            scan_.fail_at(line, "signal " + signal->name + " is a float of " + (type == 1 ? "32" : "64") + " bits but has " +
-                                    std::to_string(signal->length));
+            scan_.fail_at(line, "signal " + signal->name + " is a float of " + (type == 1 ? "32" : "64") +
+                                    " bits but has " + std::to_string(signal->length));
     }
 
     void multiplexed_by() {
@@ -249,7 +259,8 @@ class Parser {
         scan_.expect(':');
         while (!scan_.peek_word().empty()) {
             std::string name = scan_.word();
-            if (message && name != message->transmitter) message->other_transmitters.push_back(std::move(name));
+            if (message && name != message->transmitter)
+                message->other_transmitters.push_back(std::move(name));
             scan_.accept(',');
         }
         end_statement();
@@ -334,7 +345,8 @@ class Parser {
                 if (kind == "BU_" && node.name == name) object.node = &node;
             for (auto& variable : db_.environment)
                 if (kind == "EV_" && variable.name == name) object.variable = &variable;
-            if (!object.node && !object.variable) warn(line, section + " speaks of " + name + ", which is not defined");
+            if (!object.node && !object.variable)
+                warn(line, section + " speaks of " + name + ", which is not defined");
         }
         return object;
     }
@@ -391,7 +403,9 @@ class Parser {
 
     // ---- references ------------------------------------------------------------------------------------
 
-    std::uint32_t message_id() { return static_cast<std::uint32_t>(scan_.integer(0, UINT32_MAX, "message identifier")); }
+    std::uint32_t message_id() {
+        return static_cast<std::uint32_t>(scan_.integer(0, UINT32_MAX, "message identifier"));
+    }
 
     Message* message_reference(const std::string& section) {
         const int line = scan_.line();
@@ -463,8 +477,9 @@ class Parser {
             if (signal.selected_by.empty()) continue;
             if (signal.multiplexor.empty()) {
                 if (plain.size() != 1)
-                    scan_.fail_at(signal.line, "signal " + message.name + "." + signal.name + " is multiplexed, but " +
-                                                   message.name + " has " + std::to_string(plain.size()) +
+                    scan_.fail_at(signal.line, "signal " + message.name + "." + signal.name +
+                                                   " is multiplexed, but " + message.name + " has " +
+                                                   std::to_string(plain.size()) +
                                                    " multiplexors to choose from");
                 signal.multiplexor = plain.front()->name;
             }
@@ -473,11 +488,12 @@ class Parser {
             const Signal* above = &signal;
             for (std::size_t depth = 0; above && !above->multiplexor.empty(); ++depth) {
                 if (depth > message.signals.size())
-                    scan_.fail_at(signal.line, "signal " + message.name + "." + signal.name + ": its multiplexors select each other");
+                    scan_.fail_at(signal.line, "signal " + message.name + "." + signal.name +
+                                                   ": its multiplexors select each other");
                 const Signal* next = message.find(above->multiplexor);
                 if (!next)
-                    scan_.fail_at(above->line, "signal " + message.name + "." + above->name + ": multiplexor " +
-                                                   above->multiplexor + " is not defined");
+                    scan_.fail_at(above->line, "signal " + message.name + "." + above->name +
+                                                   ": multiplexor " + above->multiplexor + " is not defined");
                 above = next;
             }
         }
@@ -493,7 +509,8 @@ class Parser {
 }  // namespace
 
 const Signal* Message::find(std::string_view signal) const noexcept {
-    const auto found = std::find_if(signals.begin(), signals.end(), [&](const Signal& s) { return s.name == signal; });
+    const auto found =
+        std::find_if(signals.begin(), signals.end(), [&](const Signal& s) { return s.name == signal; });
     return found == signals.end() ? nullptr : &*found;
 }
 
@@ -506,11 +523,14 @@ double Message::cycle_time_ms() const noexcept {
 }
 
 const Message* Database::find(std::string_view message) const noexcept {
-    const auto found = std::find_if(messages.begin(), messages.end(), [&](const Message& m) { return m.name == message; });
+    const auto found =
+        std::find_if(messages.begin(), messages.end(), [&](const Message& m) { return m.name == message; });
     return found == messages.end() ? nullptr : &*found;
 }
 
-Database parse(std::string_view text, const std::string& file) { return Parser(text, file).parse(); }
+Database parse(std::string_view text, const std::string& file) {
+    return Parser(text, file).parse();
+}
 
 Database read(const std::string& path) {
     std::ifstream in(path, std::ios::binary);

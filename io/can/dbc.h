@@ -17,7 +17,7 @@ namespace shiftrig::io::can::dbc {
 
 enum class ValueType : std::uint8_t { integer, float32, float64 };
 
-using Attributes = std::map<std::string, std::string>;          // enumerations by the name of the value
+using Attributes = std::map<std::string, std::string>;  // enumerations by the name of the value
 using ValueNames = std::vector<std::pair<std::int64_t, std::string>>;
 
 struct Signal {
@@ -46,7 +46,7 @@ struct Message {
     std::string name;
     std::uint32_t id = 0;
     bool extended = false;
-    int length = 0;  // bytes; J1939 transport messages up to 1785
+    int length = 0;           // bytes; J1939 transport messages up to 1785
     std::string transmitter;  // empty: Vector__XXX
     std::vector<std::string> other_transmitters;
     std::vector<Signal> signals;

@@ -9,19 +9,28 @@ namespace shiftrig::io::can::dbc {
 
 namespace {
 
-bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\f' || c == '\v'; }
-bool is_word_start(char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (static_cast<unsigned char>(c) & 0x80) != 0;
+bool is_space(char c) {
+    return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\f' || c == '\v';
 }
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool is_word(char c) { return is_word_start(c) || is_digit(c); }
+bool is_word_start(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' ||
+           (static_cast<unsigned char>(c) & 0x80) != 0;
+}
+bool is_digit(char c) {
+    return c >= '0' && c <= '9';
+}
+bool is_word(char c) {
+    return is_word_start(c) || is_digit(c);
+}
 
 bool is_utf8(std::string_view text) {
     for (std::size_t i = 0; i < text.size();) {
         const auto lead = static_cast<unsigned char>(text[i]);
-        const std::size_t more = lead < 0x80 ? 0 : lead >= 0xC2 && lead < 0xE0 ? 1 : lead >= 0xE0 && lead < 0xF0 ? 2
-                                 : lead >= 0xF0 && lead < 0xF5                 ? 3
-                                                                               : 4;
+        const std::size_t more = lead < 0x80                   ? 0
+                                 : lead >= 0xC2 && lead < 0xE0 ? 1
+                                 : lead >= 0xE0 && lead < 0xF0 ? 2
+                                 : lead >= 0xF0 && lead < 0xF5 ? 3
+                                                               : 4;
         if (more == 4 || i + more >= text.size()) return false;
         for (std::size_t k = 1; k <= more; ++k)
             if ((static_cast<unsigned char>(text[i + k]) & 0xC0) != 0x80) return false;
@@ -89,14 +98,18 @@ bool Scanner::alone_on_line() {
     return true;
 }
 
-char Scanner::peek() { return at_end() ? '\0' : text_[at_]; }
+char Scanner::peek() {
+    return at_end() ? '\0' : text_[at_];
+}
 
 int Scanner::line() {
     skip_space();
     return line_;
 }
 
-int Scanner::column() const { return static_cast<int>(at_ - line_start_) + 1; }
+int Scanner::column() const {
+    return static_cast<int>(at_ - line_start_) + 1;
+}
 
 std::string Scanner::shown() const {
     if (at_ >= text_.size()) return "the file ends";
@@ -112,7 +125,9 @@ void Scanner::fail(const std::string& what) {
     throw InputError(file_, line_, column(), what + ", " + shown());
 }
 
-void Scanner::fail_at(int line, const std::string& what) const { throw InputError(file_, line, 0, what); }
+void Scanner::fail_at(int line, const std::string& what) const {
+    throw InputError(file_, line, 0, what);
+}
 
 std::string Scanner::peek_word() {
     skip_space();

@@ -7,3 +7,5 @@ function(shiftrig_can_test name)
 endfunction()
 
 shiftrig_can_test(can_bus_test)
+shiftrig_can_test(can_codec_test)
+shiftrig_can_test(can_dbc_test)

@@ -1,0 +1,359 @@
+#include "io/can/link.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/can/link_data.h"
+
+namespace shiftrig::io::can {
+
+namespace {
+
+constexpr int kMostBatches = 64;  // of 64 frames a tick: a flood must not hold up the loop
+
+// CRC-8 of SAE J1850: polynomial 0x1D, start and final XOR 0xFF.
+unsigned crc8_j1850(const std::uint8_t* data, int length) SHIFTRIG_REALTIME {
+    unsigned crc = 0xFF;
+    for (int i = 0; i < length; ++i) {
+        crc ^= data[i];
+        for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x80U) ? ((crc << 1) ^ 0x1DU) & 0xFFU : crc << 1;
+    }
+    return crc ^ 0xFFU;
+}
+
+}  // namespace
+
+// ---- matching ------------------------------------------------------------------------------------------------
+
+std::uint32_t pgn_of(std::uint32_t id) SHIFTRIG_REALTIME {
+    return is_pdu1(id) ? (id >> 8) & 0x3FF00U : (id >> 8) & 0x3FFFFU;
+}
+std::uint64_t exact_key(std::uint32_t id, bool extended) SHIFTRIG_REALTIME {
+    return (std::uint64_t{extended ? 1U : 0U} << 32) | id;
+}
+std::uint64_t pgn_key(std::uint32_t id) SHIFTRIG_REALTIME {
+    return (std::uint64_t{2} << 32) | pgn_of(id);
+}
+
+ReceivedMessage* CanLink::Data::match(const Frame& frame) SHIFTRIG_REALTIME {
+    if (frame.remote || frame.error) return nullptr;
+    const std::uint64_t keys[] = {exact_key(frame.id, frame.extended), pgn_key(frame.id)};
+    for (int kind = 0; kind < (frame.extended ? 2 : 1); ++kind) {
+        auto at = std::lower_bound(look_up.begin(), look_up.end(), keys[kind],
+                                   [](const LookUp& entry, std::uint64_t key) { return entry.key < key; });
+        for (; at != look_up.end() && at->key == keys[kind]; ++at) {
+            ReceivedMessage& message = received[at->message];
+            const bool to_everyone = message.to_everyone && ((frame.id >> 8) & 0xFFU) == 0xFFU;
+            const std::uint32_t ignored = to_everyone ? 0xFF00U : 0U;
+            if (((frame.id ^ message.id) & message.mask & ~ignored) == 0) return &message;
+        }
+    }
+    return nullptr;
+}
+
+// ---- trust ---------------------------------------------------------------------------------------------------
+
+unsigned ChecksumField::compute(const Frame& frame) const SHIFTRIG_REALTIME {
+    if (formula == ChecksumFormula::tsc1)
+        return tsc1_checksum(frame.id, frame.data.data(),
+                             static_cast<unsigned>(counter->raw(frame.data.data())));
+    Frame without = frame;  // the others run over the whole frame, the checksum itself taken as 0
+    codec.put(without.data.data(), 0);
+    if (formula == ChecksumFormula::crc8_j1850) return crc8_j1850(without.data.data(), frame.length);
+    unsigned sum = 0;
+    for (std::size_t i = 0; i < frame.length; ++i)
+        sum = formula == ChecksumFormula::xor8 ? sum ^ without.data[i] : sum + without.data[i];
+    return sum & 0xFFU;
+}
+
+bool CanLink::Data::trusted(ReceivedMessage& message, const Frame& frame) SHIFTRIG_REALTIME {
+    if (frame.length < message.length) {
+        ++message.report.wrong_length;
+        return false;
+    }
+    const std::uint8_t* data = frame.data.data();
+    if (message.checksum && message.checksum->codec.raw(data) !=
+                                (message.checksum->compute(frame) & message.checksum->codec.mask())) {
+        ++message.report.wrong_checksum;
+        return false;
+    }
+    if (message.counter) {
+        const unsigned modulo = message.counter->modulo;
+        const auto counter = static_cast<unsigned>(message.counter->codec.raw(data) % modulo);
+        const unsigned step = (counter + modulo - message.last_counter) % modulo;
+        const bool known = message.counting;
+        message.counting = true;
+        message.last_counter = counter;
+        if (known && (step == 0 || step > message.counter->max_step)) {
+            ++message.report.wrong_counter;
+            return false;
+        }
+        if (known) message.report.missed += step - 1;
+    }
+    if (!plausible(message, frame)) {
+        ++message.report.implausible;
+        return false;
+    }
+    return true;
+}
+
+bool CanLink::Data::plausible(const ReceivedMessage& message, const Frame& frame) const SHIFTRIG_REALTIME {
+    const std::uint8_t* data = frame.data.data();
+    for (const Field& field : message.fields) {
+        if (field.use == Use::one_of) continue;
+        if (field.enable && field.enable->raw(data) == 0) continue;
+        const auto holds = [data](const Selection& s) { return s.holds(data); };
+        if (!std::all_of(field.selected.begin(), field.selected.end(), holds)) continue;
+        const std::uint64_t raw = field.codec.raw(data);
+        if (field.codec.validity(raw) != Validity::valid) {
+            if (message.command) return false;  // a command that says it is none
+            continue;
+        }
+        const double physical = field.codec.physical(raw);
+        if (!(physical >= field.lowest && physical <= field.highest)) return false;
+    }
+    return true;
+}
+
+// ---- receiving -----------------------------------------------------------------------------------------------
+
+void CanLink::Data::decode(const ReceivedMessage& message, const Frame& frame,
+                           SignalTable& signals) const SHIFTRIG_REALTIME {
+    const std::uint8_t* data = frame.data.data();
+    for (const Field& field : message.fields) {
+        const auto holds = [data](const Selection& s) { return s.holds(data); };
+        if (!std::all_of(field.selected.begin(), field.selected.end(), holds)) continue;
+        double& value = signals.value[static_cast<std::size_t>(field.index)];
+        const std::uint64_t raw = field.codec.raw(data);
+        if (field.use == Use::one_of) {
+            value = raw == field.is ? 1 : 0;
+        } else if (field.enable && field.enable->raw(data) == 0) {
+            value = field.disabled;
+        } else if (field.when && std::find(field.when_is.begin(), field.when_is.end(),
+                                           field.when->raw(data)) == field.when_is.end()) {
+            value = field.otherwise;
+        } else if (field.codec.validity(raw) != Validity::valid) {
+            value = field.absent;
+        } else {
+            value = field.codec.physical(raw) * field.gain + field.bias;
+            if (field.use == Use::complement) value = 1 - value;
+        }
+    }
+}
+
+void CanLink::Data::take(const Frame& frame, std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME {
+    ReceivedMessage* message = match(frame);
+    if (!message) return;
+    if (!trusted(*message, frame)) {
+        message->bad_ns = now_ns;
+        message->seen_bad = message->last_was_bad = true;
+        return;
+    }
+    ++message->report.good;
+    message->good_ns = now_ns;
+    message->seen_good = true;
+    message->last_was_bad = false;
+    decode(*message, frame, signals);
+
+    const int index = static_cast<int>(message - received.data());
+    if (options.role == Role::rig && index == answer && awaiting && message->last_counter == question_counter)
+        awaiting = false;
+    if (options.role == Role::controller && index == question) {
+        pending = asked_before = true;
+        question_counter = message->last_counter;
+        question_ns = now_ns;
+    }
+}
+
+void CanLink::Data::supervise(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME {
+    valid = true;
+    for (ReceivedMessage& message : received) {
+        const bool supervised = message.timeout_ns > 0;
+        const std::int64_t since = message.seen_good ? message.good_ns : receive_start_ns;
+        const bool overdue = supervised && now_ns - since > message.timeout_ns;
+        const bool bad_lately =
+            message.last_was_bad && (!supervised || now_ns - message.bad_ns <= message.timeout_ns);
+        MessageStatus status = MessageStatus::alive;
+        if (bad_lately)
+            status = MessageStatus::corrupt;
+        else if (!message.seen_good)
+            status = message.seen_bad ? MessageStatus::lost : MessageStatus::never_seen;
+        else if (overdue)
+            status = MessageStatus::lost;
+        else if (message.late_ns > 0 && now_ns - since > message.late_ns)
+            status = MessageStatus::late;
+
+        if (overdue && message.seen_good && !message.was_overdue) {
+            ++message.report.timeouts;
+            message.counting = false;  // whoever comes back starts counting anew
+            if (!message.hold)
+                for (const Field& field : message.fields)
+                    signals.value[static_cast<std::size_t>(field.index)] = field.absent;
+        }
+        message.was_overdue = overdue;
+        message.report.status = status;
+        signals.value[static_cast<std::size_t>(message.status_index)] = static_cast<double>(status);
+        if (message.command && overdue) valid = false;
+    }
+    signals.value[static_cast<std::size_t>(valid_index)] = valid ? 1 : 0;
+}
+
+void CanLink::receive(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME {
+    Data& d = *data_;
+    if (!d.started_receiving) {
+        d.started_receiving = true;
+        d.receive_start_ns = now_ns;
+    }
+    for (int batch = 0; batch < kMostBatches; ++batch) {
+        const std::size_t count = d.port->receive(now_ns, d.buffer);
+        for (std::size_t i = 0; i < count; ++i) d.take(d.buffer[i], now_ns, signals);
+        if (count < d.buffer.size()) break;
+    }
+    d.supervise(now_ns, signals);
+}
+
+// ---- sending -------------------------------------------------------------------------------------------------
+
+void CanLink::Data::encode(SentMessage& message, const SignalTable& signals) SHIFTRIG_REALTIME {
+    std::uint8_t* data = message.frame.data.data();
+    if (message.multiplexor) {
+        message.multiplexor->put(data, message.multiplexor_values[message.turn]);
+        message.turn = (message.turn + 1) % message.multiplexor_values.size();
+    }
+    for (Field& field : message.fields) {
+        const auto holds = [data](const Selection& s) { return s.holds(data); };
+        if (!std::all_of(field.selected.begin(), field.selected.end(), holds)) continue;
+        const double value = signals.value[static_cast<std::size_t>(field.index)];
+        if (field.use == Use::one_of) {
+            field.codec.put(data, value > 0.5 ? field.is : field.otherwise_raw);
+            continue;
+        }
+        double physical = (value - field.bias) / field.gain;
+        switch (field.use) {
+            case Use::magnitude:
+                physical = std::fabs(physical);
+                break;
+            case Use::direction:
+                physical = value >= 0 ? 1 : 0;
+                break;
+            case Use::flag:
+                physical = value > field.above ? 1 : 0;
+                break;
+            case Use::complement:
+                physical = (1 - value - field.bias) / field.gain;
+                break;
+            case Use::travelled:
+                physical = field.travelled / field.gain;
+                break;
+            default:
+                break;
+        }
+        bool limited = false;
+        field.codec.put(data, field.codec.from_physical(physical, limited));
+        if (limited) ++message.report.limited;
+    }
+    if (message.counter) message.counter->codec.put(data, message.next_counter);
+    if (message.checksum) message.checksum->codec.put(data, message.checksum->compute(message.frame));
+}
+
+void CanLink::Data::transmit(SentMessage& message, std::int64_t now_ns,
+                             const SignalTable& signals) SHIFTRIG_REALTIME {
+    const int index = static_cast<int>(&message - sent.data());
+    const bool answering = options.role == Role::controller && index == answer && asked_before;
+    if (answering && pending) message.next_counter = question_counter;  // the answer echoes the question
+    encode(message, signals);
+    if (port->send(now_ns, message.frame))
+        ++message.report.good;
+    else
+        ++message.report.send_dropped;
+    if (options.role == Role::rig && index == question) {
+        awaiting = true;
+        question_counter = message.next_counter;
+    }
+    if (answering) pending = false;
+    if (message.counter) message.next_counter = (message.next_counter + 1) % message.counter->modulo;
+}
+
+bool CanLink::Data::due(SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME {
+    if (message.requested) {
+        message.requested = false;
+        return true;
+    }
+    if (message.cycle_ns == 0) return false;
+    const int index = static_cast<int>(&message - sent.data());
+    if (options.role == Role::controller && index == answer && asked_before) {
+        // An answer waits for its question, but not for ever: without questions it keeps its own time.
+        const bool silent = now_ns - question_ns > 3 * message.cycle_ns;
+        if (!silent) {
+            message.due_ns = now_ns + message.cycle_ns;
+            return pending;
+        }
+    }
+    if (now_ns < message.due_ns) return false;
+    // A late tick does not shift the schedule; cycles that passed altogether are not made up for.
+    const std::int64_t passed = (now_ns - message.due_ns) / message.cycle_ns;
+    message.due_ns += (passed + 1) * message.cycle_ns;
+    return true;
+}
+
+void CanLink::send(std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REALTIME {
+    Data& d = *data_;
+    if (!d.started_sending) {
+        d.started_sending = true;
+        d.last_send_ns = now_ns;
+        for (auto& message : d.sent) message.due_ns = now_ns + std::max<std::int64_t>(0, message.phase_ns);
+    }
+    const double elapsed = 1e-9 * static_cast<double>(now_ns - d.last_send_ns);
+    d.last_send_ns = now_ns;
+    for (auto& message : d.sent)
+        for (auto& field : message.fields)
+            if (field.use == Use::travelled)
+                field.travelled += elapsed * std::fabs(signals.value[static_cast<std::size_t>(field.index)]);
+
+    // The answer goes last: when it has arrived, all of this cycle has.
+    const int last = d.options.role == Role::controller ? d.answer : d.question;
+    for (int i = 0; i < static_cast<int>(d.sent.size()); ++i) {
+        auto& message = d.sent[static_cast<std::size_t>(i)];
+        if (i != last && d.due(message, now_ns)) d.transmit(message, now_ns, signals);
+    }
+    if (last >= 0) {
+        auto& message = d.sent[static_cast<std::size_t>(last)];
+        if (d.due(message, now_ns)) d.transmit(message, now_ns, signals);
+    }
+}
+
+// ---- the rest ------------------------------------------------------------------------------------------------
+
+CanLink::CanLink(const Mapping& mapping, CanPort& port, SignalTable& signals, const LinkOptions& options)
+    : data_(std::make_unique<Data>(mapping, port, signals, options)) {}
+CanLink::~CanLink() = default;
+CanLink::CanLink(CanLink&&) noexcept = default;
+
+bool CanLink::command_valid() const SHIFTRIG_REALTIME {
+    return data_->valid;
+}
+bool CanLink::awaiting_answer() const SHIFTRIG_REALTIME {
+    return data_->awaiting;
+}
+bool CanLink::question_pending() const SHIFTRIG_REALTIME {
+    return data_->pending;
+}
+void CanLink::set_fault(std::uint32_t, std::uint8_t, bool) SHIFTRIG_REALTIME {}
+
+std::vector<MessageReport> CanLink::report() const {
+    std::vector<MessageReport> result;
+    for (const auto& message : data_->sent) result.push_back(message.report);
+    for (const auto& message : data_->received) result.push_back(message.report);
+    return result;
+}
+double CanLink::bus_load() const noexcept {
+    return data_->load;
+}
+const std::vector<std::string>& CanLink::warnings() const noexcept {
+    return data_->warnings;
+}
+CanPort& CanLink::port() noexcept {
+    return *data_->port;
+}
+
+}  // namespace shiftrig::io::can
