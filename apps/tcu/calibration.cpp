@@ -1,6 +1,7 @@
 #include "apps/tcu/calibration.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <numbers>
 
 #include "io/field_reader.h"
@@ -111,7 +112,7 @@ void fields(Fields& f, Calibration::Limp& l) {
 
 template <class Fields>
 void fields(Fields& f, Calibration::Bus& b) {
-    f.number("engine_reference_torque_nm", b.engine_reference_torque, io::rules::positive, "100 % in engine messages");
+    f.text("can_mapping", b.mapping, "file that says what CAN frames mean, relative to this one");
 }
 
 template <class Fields>
@@ -129,11 +130,12 @@ void fields(Fields& f, Calibration& c) {
 
 Calibration read_calibration(const std::string& path) {
     Calibration calibration;
-    io::ReadContext context{path, {}, {}};
+    io::ReadContext context{path, {}};
     const YAML::Node root = io::parse_yaml(io::read_text(path), path);
     io::FieldReader reader(context, root, root.Mark(), "", "");
     fields(reader, calibration);
     reader.finish();
+    calibration.bus.mapping = (std::filesystem::path(path).parent_path() / calibration.bus.mapping).string();
     return calibration;
 }
 

@@ -83,7 +83,7 @@ struct Calibration {
     } limp;
 
     struct Bus {
-        double engine_reference_torque = 0;  // what 100 % in the engine's messages means [Nm]
+        std::string mapping;  // what the frames of a CAN bus mean; read relative to this file
     } bus;
 
     double pressure_for(double torque) const noexcept;      // kiss pressure … full pressure [Pa]

@@ -15,7 +15,7 @@ Commands Controller::step(const Sensors& s) noexcept {
         enter(Mode::limp);
     }
     switch (mode_) {
-        case Mode::listening: break;
+        case Mode::listening: hold_as_found(s, c); break;
         case Mode::neutral: neutral(s, c); break;
         case Mode::launch: launch(s, c); break;
         case Mode::driving: driving(s, c); break;
@@ -36,6 +36,12 @@ void Controller::enter(Mode mode) noexcept {
     in_mode_ = 0;
     slipping_ = 0;
     if (mode == Mode::neutral) gear_ = 0;
+}
+
+// Nothing is known yet but pressures: what is closed stays closed.
+void Controller::hold_as_found(const Sensors& s, Commands& c) noexcept {
+    for (std::size_t i = 0; i < clutch_count; ++i)
+        if (s.pressure[i] > 0.8 * cal_->clutch.full_pressure) c.pressure[i] = cal_->clutch.full_pressure;
 }
 
 // The first believable picture: a controller that (re)starts finds the machine as it is.

@@ -3,7 +3,7 @@
 //
 // It is meant to be read, and to be the start of your own. The state of the driveline is one of
 //
-//   listening nothing is known yet, nothing is commanded; a gear found locked is taken over
+//   listening not everything was heard yet: what is closed stays closed, and a gear found locked is taken over
 //   neutral   nothing closed; waits for a lever and an engine that can start off
 //   launch    one clutch slips until input and output run together (standing start, shuttle, restart in motion)
 //   driving   one clutch locked at full pressure
@@ -25,13 +25,15 @@ class Controller {
     // The calibration must outlive the controller. Everything else is its state: a copy is a snapshot.
     explicit Controller(const Calibration& calibration) noexcept : cal_(&calibration) {}
 
-    // One control cycle. Never throws, allocates or blocks. The commands are to be sent unless the mode is `listening`.
+    // One control cycle. Never throws, allocates or blocks. While the mode is `listening` they are better not sent,
+    // unless somebody waits for them.
     Commands step(const Sensors& sensors) noexcept;
 
     Mode mode() const noexcept { return mode_; }
 
   private:
     void listen(const Sensors& s) noexcept;
+    void hold_as_found(const Sensors& s, Commands& c) noexcept;
     void neutral(const Sensors& s, Commands& c) noexcept;
     void launch(const Sensors& s, Commands& c) noexcept;
     void driving(const Sensors& s, Commands& c) noexcept;

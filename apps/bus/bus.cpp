@@ -1,0 +1,82 @@
+#include "apps/bus/bus.h"
+
+#include "io/input_error.h"
+
+namespace shiftrig::bus {
+
+namespace {
+
+io::can::LinkOptions can_options(const Options& options) {
+    io::can::LinkOptions can;
+    can.role = options.role == Role::rig ? io::can::Role::rig : io::can::Role::controller;
+    can.tick_ns = options.tick_ns;
+    return can;
+}
+
+io::lcm::LinkOptions lcm_options(const Options& options) {
+    io::lcm::LinkOptions lcm;
+    lcm.role = options.role == Role::rig ? io::lcm::Role::rig : io::lcm::Role::controller;
+    lcm.model_name = options.model_name;
+    lcm.tick_ns = options.tick_ns;
+    lcm.lockstep = options.lockstep;
+    lcm.command_timeout_ns = static_cast<std::int64_t>(options.command_timeout * 1e9);
+    return lcm;
+}
+
+std::unique_ptr<io::can::CanPort> open_port(const std::string& name) {
+    throw io::InputError("bus " + name + ": unknown kind; it is inprocess, can:INTERFACE, udpcan:ADDRESS:PORT or lcm:URL");
+}
+
+}  // namespace
+
+Bus::Bus(const std::string& name, const io::can::Mapping* mapping, io::SignalTable& signals, const Options& options)
+    : name_(name) {
+    if (name.starts_with("lcm:")) {
+        lcm_.emplace(name.substr(4), signals, lcm_options(options));
+        return;
+    }
+    owned_ = open_port(name);
+    port_ = owned_.get();
+    can_.emplace(*mapping, *port_, signals, can_options(options));
+}
+
+Bus::Bus(const std::string& name, io::can::CanPort& port, const io::can::Mapping& mapping, io::SignalTable& signals,
+         const Options& options)
+    : name_(name), port_(&port) {
+    can_.emplace(mapping, port, signals, can_options(options));
+}
+
+std::uint64_t Bus::messages_lost() const noexcept {
+    if (lcm_) return lcm_->messages_lost();
+    const auto counters = port_->counters();
+    return counters.send_dropped + counters.receive_dropped + counters.malformed;
+}
+
+std::vector<std::string> Bus::warnings() const { return can_ ? can_->warnings() : lcm_->warnings(); }
+
+std::vector<std::string> Bus::summary() const {
+    std::vector<std::string> lines;
+    const auto add = [&](const std::string& message, const std::vector<std::pair<const char*, std::uint64_t>>& counts) {
+        std::string text;
+        for (const auto& [what, count] : counts)
+            if (count > 0) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + what;
+        if (!text.empty()) lines.push_back(name_ + " " + message + ": " + text);
+    };
+    if (lcm_) {
+        for (const auto& r : lcm_->report())
+            add(r.channel, {{"lost", r.lost}, {"stale", r.stale}, {"implausible", r.implausible}, {"restarts of the sender", r.restarts}});
+        const auto c = lcm_->counters();
+        add("as a whole", {{"not sent", c.send_failed + c.send_dropped}, {"of another type refused", c.refused}, {"received but not read", c.receive_dropped}});
+        return lines;
+    }
+    for (const auto& r : can_->report())
+        add(r.name, {{"of wrong length", r.wrong_length}, {"with wrong checksum", r.wrong_checksum}, {"with wrong counter", r.wrong_counter},
+                     {"implausible", r.implausible}, {"missed", r.missed}, {"time-outs", r.timeouts},
+                     {"values limited", r.limited}, {"not sent", r.send_dropped}});
+    const auto c = port_->counters();
+    add("as a whole", {{"frames not sent", c.send_dropped}, {"frames lost in reception", c.receive_dropped}, {"malformed", c.malformed},
+                       {"error frames", c.error_frames}, {"times bus-off", c.bus_off_events}, {"reconnects", c.reconnects}});
+    return lines;
+}
+
+}  // namespace shiftrig::bus

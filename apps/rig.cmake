@@ -1,0 +1,12 @@
+include_guard()
+include(${CMAKE_CURRENT_LIST_DIR}/tcu.cmake)
+# The rig: plant, scenario, buses and loop put together.
+add_library(shiftrig_rig STATIC
+  ${CMAKE_CURRENT_LIST_DIR}/rig/buses.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/rig/collector.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/rig/events.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/rig/rig.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/rig/safe_command.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/rig/session.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/rig/timeline.cpp)
+target_link_libraries(shiftrig_rig PUBLIC shiftrig_tcu shiftrig_recording shiftrig_rt)

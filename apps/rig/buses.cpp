@@ -1,0 +1,89 @@
+#include "apps/rig/buses.h"
+
+#include <time.h>
+
+#include "rt/clock.h"
+
+namespace shiftrig::rig {
+
+Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tick_ns, io::SignalTable& signals) {
+    if (model.can.IsDefined()) mapping_ = io::can::parse_mapping(model.can, model.path);
+    bus::Options options;
+    options.tick_ns = tick_ns;
+    options.lockstep = setup.lockstep;
+    options.model_name = model.description.name;
+    options.command_timeout = model.controller.command_timeout;
+
+    for (const auto& name : setup.names) {
+        const bool frames = !name.starts_with("lcm:");
+        if (frames && !mapping_)
+            throw io::InputError(model.path, 0, 0, "bus " + name + " needs the stanza `can:`, which says what the frames mean");
+        if (name != "inprocess") {
+            buses_.emplace_back(name, mapping_ ? &*mapping_ : nullptr, signals, options);
+            continue;
+        }
+        if (wire_) throw io::InputError(model.path, 0, 0, "bus inprocess can be given only once");
+        wire_ = std::make_unique<io::can::InProcessBus>(2);
+        buses_.emplace_back(name, wire_->end(0), *mapping_, signals, options);
+        if (setup.built_in)
+            node_ = std::make_unique<tcu::Node>(*setup.built_in, "inprocess", wire_->end(1), *mapping_);
+    }
+}
+
+void Buses::receive(std::int64_t now_ns, io::SignalTable& signals) SHIFTRIG_REALTIME {
+    for (auto& each : buses_) each.receive(now_ns, signals);
+}
+
+void Buses::send(std::int64_t now_ns, const io::SignalTable& signals) SHIFTRIG_REALTIME {
+    for (auto& each : buses_) each.send(now_ns, signals);
+    if (node_) node_->tick(now_ns);
+}
+
+bool Buses::command_valid() const noexcept {
+    if (buses_.empty()) return true;
+    for (const auto& each : buses_)
+        if (each.command_valid()) return true;
+    return false;
+}
+
+bool Buses::wait_for_answer(std::int64_t now_ns, io::SignalTable& signals, std::int64_t timeout_ns) {
+    const rt::SteadyClock clock;
+    const std::int64_t until = clock.now() + timeout_ns;
+    for (auto& each : buses_) {
+        while (each.awaiting_answer()) {
+            each.receive(now_ns, signals);
+            if (!each.awaiting_answer()) break;
+            const std::int64_t left = until - clock.now();
+            if (left <= 0 || !each.wait(left)) return false;
+        }
+    }
+    return true;
+}
+
+std::uint64_t Buses::messages_lost() const noexcept {
+    std::uint64_t lost = 0;
+    for (const auto& each : buses_) lost += each.messages_lost();
+    return lost;
+}
+
+namespace {
+
+void append(std::vector<std::string>& all, const std::vector<std::string>& more) {
+    all.insert(all.end(), more.begin(), more.end());
+}
+
+}  // namespace
+
+std::vector<std::string> Buses::warnings() const {
+    std::vector<std::string> all;
+    for (const auto& each : buses_) append(all, each.warnings());
+    return all;
+}
+
+std::vector<std::string> Buses::summary() const {
+    std::vector<std::string> all;
+    for (const auto& each : buses_) append(all, each.summary());
+    return all;
+}
+
+}  // namespace shiftrig::rig

@@ -1,0 +1,49 @@
+// The rig's side of its buses, and the built-in controller on the other end of the in-process one.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/bus/bus.h"
+#include "apps/tcu/node.h"
+#include "io/model_file.h"
+#include "io/signals.h"
+
+namespace shiftrig::rig {
+
+struct BusSetup {
+    std::vector<std::string> names;                   // as the user gives them; see apps/bus/bus.h
+    std::optional<tcu::Calibration> built_in;         // the reference controller on `inprocess`
+    bool lockstep = false;
+};
+
+class Buses {
+  public:
+    Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tick_ns, io::SignalTable& signals);
+
+    void receive(std::int64_t now_ns, io::SignalTable& signals) SHIFTRIG_REALTIME;
+    // What the rig has to say at `now_ns`; then the built-in controller takes its turn.
+    void send(std::int64_t now_ns, const io::SignalTable& signals) SHIFTRIG_REALTIME;
+
+    bool any() const noexcept { return !buses_.empty(); }
+    // A command is heard on at least one bus; true where there is no bus at all.
+    bool command_valid() const SHIFTRIG_REALTIME;
+    // Lockstep: waits until no bus awaits an answer any more.
+    bool wait_for_answer(std::int64_t now_ns, io::SignalTable& signals, std::int64_t timeout_ns);
+
+    std::uint64_t messages_lost() const noexcept;
+    std::vector<std::string> warnings() const;
+    std::vector<std::string> summary() const;
+    const tcu::Controller* built_in() const noexcept { return node_ ? &node_->controller() : nullptr; }
+
+  private:
+    std::optional<io::can::Mapping> mapping_;
+    std::unique_ptr<io::can::InProcessBus> wire_;     // ends: 0 the rig, 1 the built-in controller
+    std::vector<bus::Bus> buses_;
+    std::unique_ptr<tcu::Node> node_;
+};
+
+}  // namespace shiftrig::rig

@@ -1,0 +1,78 @@
+#include "apps/rig/collector.h"
+
+#include <algorithm>
+
+namespace shiftrig::rig {
+
+namespace {
+
+// What a shift is judged by (docs/shift-quality.md).
+bool matters_for_shifts(std::string_view name) {
+    for (const char* prefix : {"clutch.", "driver.", "mass.", "body.", "shaft.", "engine.", "controller.", "rig.safe_command"})
+        if (name.starts_with(prefix)) return true;
+    return false;
+}
+
+}  // namespace
+
+Collector::Collector(const Rig& rig, std::int64_t ticks, const CollectorOptions& options) {
+    const auto& table = rig.signals();
+    const auto fits = [&](std::size_t signals) {
+        return static_cast<std::size_t>(ticks) * (signals + 1) * sizeof(double) <= options.most_bytes;
+    };
+    for (int i = 0; i < table.size(); ++i) signals_.push_back(i);
+    if (!fits(signals_.size()))
+        std::erase_if(signals_, [&](int i) { return !matters_for_shifts(table.signal(i).name); });
+    capacity_ = static_cast<std::size_t>(ticks);
+    if (!fits(signals_.size())) capacity_ = options.most_bytes / sizeof(double) / (signals_.size() + 1);
+
+    run_.time.resize(capacity_);
+    for (const int i : signals_) run_.columns.push_back({table.signal(i), std::vector<double>(capacity_)});
+    plant_events_.reserve(options.most_events);
+    rig_events_.reserve(options.most_events);
+}
+
+void Collector::take(const Rig& rig) SHIFTRIG_REALTIME {
+    if (count_ < capacity_) {
+        run_.time[count_] = rig.sim_time();
+        for (std::size_t c = 0; c < signals_.size(); ++c) run_.columns[c].value[count_] = rig.value(signals_[c]);
+        ++count_;
+    } else {
+        ++left_out_;
+    }
+    events_left_out_ += rig.plant_events_not_kept();
+    const auto keep = [this](auto& kept, const auto& events) {
+        for (const auto& event : events) {
+            if (kept.size() < kept.capacity()) kept.push_back(event);  // within the reserve: nothing is allocated
+            else ++events_left_out_;
+        }
+    };
+    keep(plant_events_, rig.plant_events());
+    keep(rig_events_, rig.rig_events());
+}
+
+analysis::Run Collector::finish(const Rig& rig) {
+    run_.time.resize(count_);
+    for (auto& column : run_.columns) column.value.resize(count_);
+    const auto& devices = rig.model().device_names();
+    for (const auto& event : plant_events_)
+        run_.changes.push_back({event, event.device >= 0 ? devices[static_cast<std::size_t>(event.device)] : "",
+                                plant::explain(rig.model(), event)});
+    for (const auto& event : rig_events_) {
+        analysis::Change change;
+        change.event.time = event.time;
+        change.text = explain(rig.signals(), event);
+        run_.changes.push_back(std::move(change));
+    }
+    std::stable_sort(run_.changes.begin(), run_.changes.end(),
+                     [](const auto& a, const auto& b) { return a.event.time < b.event.time; });
+    const auto& setup = rig.setup();
+    run_.machine = setup.model.description;
+    run_.model_text = setup.model.text;
+    if (setup.scenario) run_.identity.emplace_back("scenario", setup.scenario->name);
+    run_.identity.emplace_back("model", run_.machine.name);
+    run_.identity.emplace_back("kernel", std::string(rig.model().kernel()));
+    return std::move(run_);
+}
+
+}  // namespace shiftrig::rig

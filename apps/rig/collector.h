@@ -1,0 +1,39 @@
+// Keeps a run in memory, tick by tick, for the judgement at its end. Room is taken beforehand, so that take() may be
+// called from the loop; what does not fit any more is left out, and said.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "analysis/run.h"
+#include "apps/rig/rig.h"
+
+namespace shiftrig::rig {
+
+struct CollectorOptions {
+    std::size_t most_bytes = std::size_t{256} << 20;
+    std::size_t most_events = 100'000;
+};
+
+class Collector {
+  public:
+    // For `ticks` ticks. Where all signals would not fit, only those that the judgement of shifts needs are kept.
+    Collector(const Rig& rig, std::int64_t ticks, const CollectorOptions& options = {});
+
+    void take(const Rig& rig) SHIFTRIG_REALTIME;
+
+    // Everything taken so far, events in words; to be called once, after the run.
+    analysis::Run finish(const Rig& rig);
+    std::int64_t ticks_left_out() const noexcept { return left_out_; }
+    std::int64_t events_left_out() const noexcept { return events_left_out_; }
+
+  private:
+    std::vector<int> signals_;
+    std::vector<plant::Event> plant_events_;
+    std::vector<RigEvent> rig_events_;
+    analysis::Run run_;
+    std::size_t capacity_ = 0, count_ = 0;  // ticks
+    std::int64_t left_out_ = 0, events_left_out_ = 0;
+};
+
+}  // namespace shiftrig::rig

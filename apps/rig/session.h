@@ -1,0 +1,50 @@
+// A rig under the loop: who calls tick(), at what pace, and what is done beside it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "apps/rig/collector.h"
+#include "apps/rig/rig.h"
+#include "io/recording/writer.h"
+#include "rt/loop.h"
+#include "rt/thread.h"
+#include "rt/trace.h"
+
+namespace shiftrig::rig {
+
+struct SessionOptions {
+    rt::LoopSettings loop;                      // period and number of slots are the rig's and the scenario's
+    io::RecordingWriter* recording = nullptr;   // begun by the session, not ended
+    Collector* collector = nullptr;
+    rt::Trace* trace = nullptr;
+    // In the loop, before and after every tick. Whoever sets them keeps the loop's promise: no waiting, no allocation.
+    std::function<void(Rig&, const rt::Tick&)> before, after;
+};
+
+class Session {
+  public:
+    Session(Rig& rig, SessionOptions options);
+
+    rt::LoopControl& control() noexcept { return loop_.control(); }  // stop, pause, single step, speed: any thread
+    // The whole run, in the calling thread.
+    const rt::LoopReport& run();
+
+  private:
+    void tick(const rt::Tick& tick);
+    void record(const rt::Tick& tick, std::int64_t began);
+
+    Rig& rig_;
+    SessionOptions options_;
+    rt::Loop<> loop_;
+    rt::SteadyClock clock_;
+    rt::Trace::Name span_tick_ = 0, span_record_ = 0;
+    std::int64_t compute_ns_ = 0, started_ns_ = 0;
+};
+
+// What a recording says of the run before its first tick.
+io::Manifest manifest_of(const Rig& rig, const rt::LoopSettings& loop);
+
+}  // namespace shiftrig::rig
