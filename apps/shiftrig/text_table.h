@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdio>
+#include <cstring>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -19,7 +20,8 @@ inline std::string digits(double value, int count = 5) {
 inline std::string decimals(double value, int count) {
     char text[40];
     std::snprintf(text, sizeof text, "%.*f", count, value);
-    return text;
+    const bool minus_zero = text[0] == '-' && std::strspn(text + 1, "0.") == std::strlen(text + 1);
+    return minus_zero ? text + 1 : text;
 }
 
 class TextTable {

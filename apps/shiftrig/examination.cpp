@@ -1,0 +1,198 @@
+#include "apps/shiftrig/examination.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <ostream>
+
+#include "apps/shiftrig/text_table.h"
+#include "plant/structure.h"
+
+namespace shiftrig::cli {
+
+namespace {
+
+using json = nlohmann::ordered_json;
+
+constexpr double slow_rpm = 1800, fast_rpm = 2100;  // of the gear table
+
+std::vector<double> frequencies(const plant::ModalResult& modal) {
+    std::vector<double> result;
+    for (const auto& mode : modal.modes) result.push_back(mode.frequency);
+    return result;
+}
+
+json modes_as_json(const Examination& examination, const plant::ModalResult& modal) {
+    json modes = json::array();
+    for (const auto& mode : modal.modes) {
+        json shape = json::object(), kinetic = json::object(), elastic = json::object();
+        for (std::size_t i = 0; i < examination.machine.masses.size(); ++i) {
+            shape[examination.machine.masses[i].name] = mode.shape[i];
+            kinetic[examination.machine.masses[i].name] = mode.kinetic_share[i];
+        }
+        for (const auto& [device, share] : mode.elastic_share) elastic[device] = share;
+        modes.push_back({{"frequency_hz", mode.frequency},
+                         {"damping_ratio", mode.damping_ratio},
+                         {"shape", shape},
+                         {"kinetic_share", kinetic},
+                         {"elastic_share", elastic}});
+    }
+    return modes;
+}
+
+std::string joined(const std::vector<std::string>& words, const char* between) {
+    std::string text;
+    for (const auto& word : words) text += (text.empty() ? "" : between) + word;
+    return text;
+}
+
+void print_masses(std::ostream& out, const Examination& examination) {
+    out << "masses\n";
+    TextTable table;
+    for (const auto& mass : examination.machine.masses)
+        table.row({mass.name, digits(mass.inertia), mass.motion == plant::Motion::rotating ? "kg m²" : "kg"});
+    table.print(out);
+}
+
+void print_distribution(std::ostream& out, const Examination& examination) {
+    out << "\ndistribution matrix (the share of each device's torque that a mass passes into it)\n";
+    // Printed by device, because there are more of them than fit across a terminal.
+    TextTable table;
+    for (std::size_t k = 0; k < examination.devices.size(); ++k) {
+        std::string links;
+        for (std::size_t j = 0; j < examination.masses.size(); ++j) {
+            const double factor =
+                examination.distribution(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k));
+            if (factor != 0)
+                links += (links.empty() ? "" : ", ") + examination.masses[j] + " " + digits(factor);
+        }
+        table.row({examination.devices[k] + ":  " + links});
+    }
+    table.print(out);
+}
+
+void print_gears(std::ostream& out, const Examination& examination) {
+    const auto listed = [](const plant::ModalResult& modal) {
+        std::string text;
+        for (const double frequency : frequencies(modal))
+            text += (text.empty() ? "" : "  ") + digits(frequency, 4);
+        return text.empty() ? "none" : text;
+    };
+    if (!examination.gears.empty()) {
+        out << "\ngears\n";
+        TextTable table;
+        table.row({"gear", "ratio", "km/h at 1800", "km/h at 2100", "closed"});
+        for (const auto& [variant, modal] : examination.gears)
+            table.row({variant.name, variant.ratio ? digits(*variant.ratio) : "-",
+                       variant.metres_per_radian ? decimals(variant.kmh(slow_rpm), 2) : "-",
+                       variant.metres_per_radian ? decimals(variant.kmh(fast_rpm), 2) : "-",
+                       joined(variant.closed, " ")});
+        table.print(out);
+    }
+    out << "\nnatural frequencies, undamped, Hz\n";
+    TextTable table;
+    for (const auto& [variant, modal] : examination.gears) table.row({variant.name + "  " + listed(modal)});
+    table.row({"all open  " + listed(examination.open)});
+    table.print(out);
+}
+
+void print_shapes(std::ostream& out, const Examination& examination, const std::string& name,
+                  const plant::ModalResult& modal) {
+    out << "\nmode shapes, " << name << " (speed of each mass, 1 where most of the kinetic energy is)\n";
+    TextTable table;
+    std::vector<std::string> head{"Hz"}, damping{"damping ratio"};
+    for (const auto& mode : modal.modes) {
+        head.push_back(digits(mode.frequency, 4));
+        damping.push_back(digits(mode.damping_ratio, 2));
+    }
+    table.row(head);
+    table.row(damping);
+    for (std::size_t i = 0; i < examination.machine.masses.size(); ++i) {
+        std::vector<std::string> row{examination.machine.masses[i].name};
+        for (const auto& mode : modal.modes) row.push_back(decimals(mode.shape[i], 3));
+        table.row(row);
+    }
+    table.print(out);
+}
+
+}  // namespace
+
+Examination examine(const io::ModelFile& file) {
+    try {
+        Examination result;
+        result.machine = file.description;
+        const plant::Structure structure = plant::build_structure(file.description);
+        result.masses = structure.mass_names;
+        for (const auto& pair : structure.pairs) result.devices.push_back(pair.name);
+        for (const auto& mesh : structure.meshes) result.devices.push_back(mesh.name);
+        for (const auto& shaft : structure.shafts) result.devices.push_back(shaft.name);
+        for (const auto& damper : structure.dampers) result.devices.push_back(damper.name);
+        result.distribution.resize(structure.masses(), static_cast<Eigen::Index>(result.devices.size()));
+        result.distribution << structure.pair_columns(), structure.mesh_columns(), structure.shaft_columns(),
+            structure.damper_columns();
+        for (auto& variant : plant::gear_variants(file.description)) {
+            auto modal = plant::natural_modes(variant.description, variant.closed);
+            result.gears.push_back({std::move(variant), std::move(modal)});
+        }
+        result.open = plant::natural_modes(file.description, {});
+        result.warnings = plant::model_warnings(file.description);
+        return result;
+    } catch (const plant::ModelError& error) {
+        throw io::located(file, error);
+    }
+}
+
+nlohmann::ordered_json as_json(const Examination& examination) {
+    json masses = json::array(), matrix = json::array(), gears = json::array(), modes = json::object(),
+         tie_ups = json::array();
+    for (const auto& mass : examination.machine.masses) {
+        const bool rotating = mass.motion == plant::Motion::rotating;
+        masses.push_back({{"name", mass.name}, {rotating ? "inertia_kg_m2" : "mass_kg", mass.inertia}});
+    }
+    for (Eigen::Index j = 0; j < examination.distribution.rows(); ++j) {
+        json row = json::array();
+        for (const double factor : examination.distribution.row(j)) row.push_back(factor);
+        matrix.push_back(row);
+    }
+    for (const auto& [variant, modal] : examination.gears) {
+        json gear = {{"name", variant.name}, {"closed", variant.closed}};
+        gear["ratio"] = variant.ratio ? json(*variant.ratio) : json();
+        const bool drives_a_body = variant.metres_per_radian.has_value();
+        gear["kmh_at_1800_rpm"] = drives_a_body ? json(variant.kmh(slow_rpm)) : json();
+        gear["kmh_at_2100_rpm"] = drives_a_body ? json(variant.kmh(fast_rpm)) : json();
+        gear["modes_hz"] = frequencies(modal);
+        gears.push_back(gear);
+        modes[variant.name] = modes_as_json(examination, modal);
+        for (const auto& loop : variant.tie_ups)
+            tie_ups.push_back({{"gear", variant.name}, {"devices", loop.devices}});
+    }
+    modes["open"] = modes_as_json(examination, examination.open);
+    return {{"name", examination.machine.name},
+            {"masses", masses},
+            {"distribution_matrix",
+             {{"masses", examination.masses}, {"devices", examination.devices}, {"values", matrix}}},
+            {"gears", gears},
+            {"open", {{"modes_hz", frequencies(examination.open)}}},
+            {"modes", modes},
+            {"tie_ups", tie_ups},
+            {"warnings", examination.warnings}};
+}
+
+void print(std::ostream& out, const Examination& examination, bool with_shapes) {
+    out << examination.machine.name << "\n\n";
+    print_masses(out, examination);
+    print_distribution(out, examination);
+    print_gears(out, examination);
+    if (with_shapes) {
+        for (const auto& [variant, modal] : examination.gears)
+            print_shapes(out, examination, variant.name, modal);
+        print_shapes(out, examination, "all open", examination.open);
+    }
+    for (const auto& [variant, modal] : examination.gears)
+        for (const auto& loop : variant.tie_ups)
+            out << "\ntie-up in " << variant.name << ": " << joined(loop.devices, ", ")
+                << " form a loop; the split of their torques is not unique\n";
+    if (!examination.warnings.empty()) out << "\nwarnings\n";
+    for (const auto& warning : examination.warnings) out << "  " << warning << '\n';
+}
+
+}  // namespace shiftrig::cli

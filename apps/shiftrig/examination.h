@@ -1,0 +1,34 @@
+// What `shiftrig check` finds out about a machine, as JSON and in words.
+#pragma once
+
+#include <Eigen/Core>
+#include <iosfwd>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "io/model_file.h"
+#include "plant/modal.h"
+
+namespace shiftrig::cli {
+
+struct Examination {
+    struct Gear {
+        plant::GearVariant variant;
+        plant::ModalResult modal;
+    };
+    plant::Description machine;
+    std::vector<std::string> masses, devices;  // rows and columns of the distribution matrix
+    Eigen::MatrixXd distribution;              // [Algin] SDM: one column per device
+    std::vector<Gear> gears;
+    plant::ModalResult open;  // every clutch and brake open
+    std::vector<std::string> warnings;
+};
+
+// Throws io::InputError.
+Examination examine(const io::ModelFile& file);
+
+nlohmann::ordered_json as_json(const Examination& examination);
+void print(std::ostream& out, const Examination& examination, bool with_shapes);
+
+}  // namespace shiftrig::cli
