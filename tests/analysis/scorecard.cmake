@@ -1,0 +1,6 @@
+foreach(subject shifts)
+  add_executable(analysis_${subject}_test ${CMAKE_CURRENT_LIST_DIR}/${subject}_test.cpp)
+  target_link_libraries(analysis_${subject}_test PRIVATE shiftrig_analysis GTest::gtest_main)
+  target_compile_definitions(analysis_${subject}_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  gtest_discover_tests(analysis_${subject}_test)
+endforeach()
