@@ -1,0 +1,135 @@
+// The diesel engine: governor line, full load, limits, lags, stall and start.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "plant/laws/engine.h"
+
+namespace shiftrig::plant {
+namespace {
+
+constexpr double rpm = 3.14159265358979323846 / 30;
+
+Engine reference_engine() {
+    Engine e;
+    for (auto [speed, torque] : {std::pair{700., 550.},
+                                 {850., 700.},
+                                 {1000., 880.},
+                                 {1200., 1060.},
+                                 {1400., 1170.},
+                                 {1600., 1201.},
+                                 {1800., 1144.},
+                                 {2003., 972.},
+                                 {2100., 858.},
+                                 {2154., 729.}}) {
+        e.full_load.emplace_back(speed * rpm, torque);
+    }
+    e.governor_slope = 187;
+    e.low_idle = 900 * rpm;
+    e.high_idle = 2191 * rpm;
+    e.friction_constant = 70;
+    e.friction_per_speed = 0.45;
+    e.actuator_lag = 0.04;
+    e.turbo_instant_fraction = 0.62;
+    e.turbo_lag = 0.5;
+    e.fade_from = 700 * rpm;
+    e.fade_to = 500 * rpm;
+    e.stall_speed = 400 * rpm;
+    return e;
+}
+constexpr double peak = 1201;
+
+EngineInput throttle(double value) {
+    EngineInput input;
+    input.throttle = value;
+    return input;
+}
+
+EngineState settle(const Engine& e, const EngineInput& input, double speed, double seconds = 10) {
+    EngineState state;
+    const double dt = 1e-3;
+    for (double t = 0; t < seconds; t += dt) {
+        const EngineState rate = engine_rate(e, peak, input, state, speed);
+        state.torque += dt * rate.torque;
+        state.boost += dt * rate.boost;
+    }
+    return state;
+}
+
+TEST(Engine, SettlesOnTheGovernorLineAndOnFullLoad) {
+    const Engine e = reference_engine();
+    const double no_load = 1840 * rpm, share = (no_load - e.low_idle) / (e.high_idle - e.low_idle);
+    EXPECT_NEAR(settle(e, throttle(share), 1801 * rpm).torque, 187 * (1840 - 1801) * rpm, 1e-6);
+    EXPECT_NEAR(settle(e, throttle(1), 1600 * rpm, 30).torque, 1201, 1e-6);
+    EXPECT_NEAR(settle(e, throttle(1), 2154 * rpm).torque, 187 * 37 * rpm, 1e-6);
+}
+
+TEST(Engine, BoostIsWaitedFor) {
+    const Engine e = reference_engine();
+    EngineState state = settle(e, throttle(1), 1600 * rpm, 0.15);
+    EXPECT_LT(state.torque, 0.8 * 1201);
+    EXPECT_GT(state.torque, 0.55 * 1201);
+}
+
+TEST(Engine, Tsc1LimitsTorqueAndTakesOverSpeed) {
+    const Engine e = reference_engine();
+    EngineInput input = throttle(1);
+    input.torque_limit = 0.5;
+    EXPECT_NEAR(settle(e, input, 1600 * rpm).torque, 0.5 * peak, 1e-3);
+    input = throttle(1);
+    input.speed_request_enable = true;
+    input.speed_request = 1500 * rpm;
+    EXPECT_NEAR(settle(e, input, 1490 * rpm).torque, 187 * 10 * rpm, 1e-6);
+}
+
+TEST(Engine, FrictionShowsOnlyWhenMotoring) {
+    const Engine e = reference_engine();
+    EngineInput cut = throttle(1);
+    cut.fuel_cut = true;
+    EXPECT_NEAR(settle(e, cut, 150).torque, -(70 + 0.45 * 150), 1e-6);
+    EXPECT_NEAR(settle(e, throttle(0), 150).torque, -(70 + 0.45 * 150), 1e-6);  // overrun far above idle
+    EXPECT_NEAR(settle(e, throttle(0), 901 * rpm).torque, -187 * rpm, 1e-6);    // on the governor's line
+    EXPECT_NEAR(settle(e, throttle(0), 900 * rpm).torque, 0, 1e-9);
+}
+
+TEST(Engine, CurveFadesBelowItsLowestSpeed) {
+    const Engine e = reference_engine();
+    EXPECT_NEAR(full_load(e, 700 * rpm), 550, 1e-9);
+    EXPECT_NEAR(full_load(e, 600 * rpm), 275, 1e-9);
+    EXPECT_EQ(full_load(e, 500 * rpm), 0);
+    EXPECT_EQ(full_load(e, 100), interpolate(e.full_load, 100));
+}
+
+TEST(Engine, StallsHoldsAndStartsAgain) {
+    const Engine e = reference_engine();
+    double crank = 0;
+    EngineMode mode = next_engine_mode(e, EngineMode::running, 399 * rpm, false, 1e-3, crank);
+    EXPECT_EQ(mode, EngineMode::stalled);
+    EXPECT_EQ(engine_torque(e, peak, throttle(1), {500, 1}, mode, 30), 0);
+    EXPECT_NEAR(stalled_friction_capacity(e, mode, 0), 70, 1e-12);
+    EXPECT_EQ(stalled_friction_capacity(e, EngineMode::running, 0), 0);
+    mode = next_engine_mode(e, mode, 0, false, 1e-3, crank);
+    EXPECT_EQ(mode, EngineMode::stalled) << "it does not start by itself";
+    mode = next_engine_mode(e, mode, 0, true, 1e-3, crank);
+    EXPECT_EQ(mode, EngineMode::cranking);
+    // Cranking a free engine of 2.6 kg m² reaches the fade speed well within the starter's time.
+    double speed = 0;
+    int steps = 0;
+    while (mode == EngineMode::cranking && steps < 5000) {
+        speed += 1e-3 * engine_torque(e, peak, throttle(0), {}, mode, speed) / 2.6;
+        mode = next_engine_mode(e, mode, speed, false, 1e-3, crank);
+        ++steps;
+    }
+    EXPECT_EQ(mode, EngineMode::running);
+    EXPECT_LT(steps, 1000);
+    crank = 0;
+    mode = EngineMode::cranking;
+    for (steps = 0; mode == EngineMode::cranking && steps < 5000; ++steps) {
+        mode = next_engine_mode(e, mode, 10, false, 1e-3, crank);
+    }
+    EXPECT_EQ(mode, EngineMode::stalled) << "a blocked engine gives up";
+    EXPECT_NEAR(steps, 3000, 1);
+}
+
+}  // namespace
+}  // namespace shiftrig::plant
