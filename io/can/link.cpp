@@ -136,7 +136,6 @@ void CanLink::Data::decode(const ReceivedMessage& message, const Frame& frame,
             value = field.absent;
         } else {
             value = field.codec.physical(raw) * field.gain + field.bias;
-            if (field.use == Use::complement) value = 1 - value;
         }
     }
 }
@@ -238,9 +237,6 @@ void CanLink::Data::encode(SentMessage& message, const SignalTable& signals) SHI
                 break;
             case Use::flag:
                 physical = value > field.above ? 1 : 0;
-                break;
-            case Use::complement:
-                physical = (1 - value - field.bias) / field.gain;
                 break;
             case Use::travelled:
                 physical = field.travelled / field.gain;

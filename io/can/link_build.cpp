@@ -155,6 +155,10 @@ Field CanLink::Data::build_field(const Mapping& mapping, const dbc::Message& lay
                          or_else(map.times ? std::optional(map.times->value) : std::nullopt, 1);
     field.gain = unit->factor * scale;
     field.bias = unit->offset * scale;
+    if (map.use == Use::complement) {  // x/per = 1 − bus value
+        field.gain = -field.gain;
+        field.bias = scale - field.bias;
+    }
 
     if (map.plausible)
         std::tie(field.lowest, field.highest) = *map.plausible;
