@@ -10,11 +10,11 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "io/input_error.h"
 #include "io/lcm/spsc_queue.h"
 #include "plant/realtime.h"
 
@@ -23,9 +23,9 @@ typedef struct _lcm_t lcm_t;
 namespace shiftrig::io::lcm {
 
 // The network cannot be used as asked; what() is one line that says what to do.
-class EndpointError : public std::runtime_error {
+class EndpointError : public InputError {
   public:
-    using std::runtime_error::runtime_error;
+    using InputError::InputError;
 };
 
 inline constexpr std::size_t largest_message = 4096;  // encoded bytes; plant_info_t has 2.7 k

@@ -5,18 +5,18 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "io/input_error.h"
 #include "plant/signal.h"
 
 namespace shiftrig::io {
 
 // A recording or snapshot that cannot be written or read; what() is one line, beginning with the path.
-class RecordingError : public std::runtime_error {
+class RecordingError : public InputError {
   public:
-    using std::runtime_error::runtime_error;
+    using InputError::InputError;
 };
 
 struct Manifest {

@@ -1,0 +1,51 @@
+// shiftrig export: a recording for others' tools.
+#include <iostream>
+#include <memory>
+
+#include "apps/shiftrig/command.h"
+#include "io/recording/csv.h"
+#include "io/recording/mcap.h"
+#include "io/recording/reader.h"
+
+namespace shiftrig::cli {
+
+namespace {
+
+struct Options {
+    std::string recording, csv, mcap;
+};
+
+using Export = std::int64_t (*)(io::RecordingReader&, const std::string&);
+
+// What can be read is exported; what ended the reading early is told.
+int export_to(const Options& options, const std::string& path, Export write) {
+    io::RecordingReader reader(options.recording);
+    const std::int64_t ticks = write(reader, path);
+    if (path != "-") std::cerr << path << ": " << ticks << " ticks\n";
+    if (reader.ending() == io::Ending::complete) return good;
+    std::cerr << reader.complaint() << '\n';
+    return bad_input;
+}
+
+int run(const Options& options) {
+    int worst = good;
+    if (!options.csv.empty()) worst = std::max(worst, export_to(options, options.csv, io::export_csv));
+    if (!options.mcap.empty()) worst = std::max(worst, export_to(options, options.mcap, io::export_mcap));
+    return worst;
+}
+
+Command::Run declare(CLI::App& app) {
+    auto options = std::make_shared<Options>();
+    app.add_option("RECORDING", options->recording, "what `shiftrig run --record` wrote")->required();
+    auto* formats = app.add_option_group("formats");
+    formats->add_option("--csv", options->csv, "a column per signal, a row per tick; - is standard output");
+    formats->add_option("--mcap", options->mcap, "for Foxglove and PlotJuggler");
+    formats->require_option(1, 0);
+    return [options] { return run(*options); };
+}
+
+const Command export_command("export", "a recording as CSV or MCAP", declare);
+
+}  // namespace
+
+}  // namespace shiftrig::cli
