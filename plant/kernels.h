@@ -1,0 +1,41 @@
+// The one inner loop of a step: a tall product y = y0 + P v with P stored in panels of eight rows, so that
+// a row block is a vector register (AVX-512) or two (AVX2). Which implementation runs is chosen when a
+// model is built; all sum in the same order, but those with fused multiply-add round once where the
+// portable one rounds twice, so bits depend on the kernel.
+//
+//   panel(r, c) = P[(r / 8 · columns + c) · 8 + r % 8]
+//
+// Columns are dealt to four running sums by c % 4, added at the end as (s0 + s1) + (s2 + s3).
+#pragma once
+
+#include "plant/plant.h"
+
+namespace shiftrig::plant::detail {
+
+constexpr int panel_rows = 8;
+constexpr int padded(int rows) noexcept { return (rows + panel_rows - 1) / panel_rows * panel_rows; }
+// Doubles that a panel takes.
+constexpr int panel_size(int rows, int columns) noexcept { return padded(rows) * columns; }
+
+// y[0 … 8·blocks) = y0 + P v, with y0 = 0 where `y0` is null. y may be y0, but must not be v.
+using Multiply = void (*)(const double* panel, int blocks, int columns, const double* v, const double* y0,
+                          double* y) SHIFTRIG_REALTIME;
+
+struct Kernel {
+    KernelKind kind{};
+    const char* name = "";
+    Multiply multiply = nullptr;
+};
+
+// The best kernel this processor runs for `automatic`, otherwise the one asked for. Throws ModelError if
+// the processor or the build lacks it.
+Kernel choose_kernel(KernelKind kind);
+
+void multiply_portable(const double*, int, int, const double*, const double*, double*) SHIFTRIG_REALTIME;
+void multiply_avx2(const double*, int, int, const double*, const double*, double*) SHIFTRIG_REALTIME;
+void multiply_avx512(const double*, int, int, const double*, const double*, double*) SHIFTRIG_REALTIME;
+
+// Column-major matrix (leading dimension padded(rows)) into panels.
+void to_panels(const double* matrix, int rows, int columns, double* panel) SHIFTRIG_REALTIME;
+
+}  // namespace shiftrig::plant::detail
