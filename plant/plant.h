@@ -101,7 +101,6 @@ class Model {
     const std::vector<std::string>& device_names() const noexcept;  // as Event::device counts them
 
     std::size_t state_size() const noexcept;  // [bytes]
-    // Layout for tools: ω of mass i is state.speeds()[i] in description order.
 
     const detail::ModelData& data() const noexcept { return *data_; }
 
@@ -129,6 +128,8 @@ class State {
     explicit State(const Model& model);  // the description's initial state, joined onto its locked devices
     std::int64_t steps() const noexcept; // since start
     double time() const noexcept;        // steps·h, never accumulated
+    std::span<const double> speeds() const noexcept;  // ω of each mass, description order [rad/s] or [m/s]
+    std::span<const double> twists() const noexcept;  // of each shaft [rad]
     std::span<const std::byte> bytes() const noexcept;
     // False (and unchanged) if the size is not the model's.
     bool restore(std::span<const std::byte> bytes) noexcept;

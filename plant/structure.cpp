@@ -2,7 +2,8 @@
 
 #include <algorithm>
 
-#include "plant/plant.h"
+#include "plant/laws/friction.h"
+#include "plant/laws/plough.h"
 #include "plant/validation.h"
 
 namespace shiftrig::plant {
@@ -29,10 +30,8 @@ double nominal_capacity(const Clutch& clutch) {
     const auto& wet = std::get<WetPlates>(clutch.friction);
     const auto* hydraulic = std::get_if<ActuationHydraulic>(&clutch.actuation);
     const double pressure = hydraulic ? hydraulic->maximum_pressure : 2 * wet.return_pressure + 1e5;
-    const double ro = wet.outer_radius, ri = wet.inner_radius;
-    const double mean_radius = 2. / 3 * (ro * ro * ro - ri * ri * ri) / (ro * ro - ri * ri);
-    return (wet.mu_sliding + wet.mu_rise) * (pressure - wet.return_pressure) * wet.piston_area * mean_radius *
-           wet.surfaces;
+    const FrictionLaw law = friction_law(wet);
+    return static_capacity(law, load_from_pressure(law, pressure));
 }
 
 // Draft of all ploughs on a body at walking pace, and its tyres' motion resistance, [N].
@@ -42,7 +41,7 @@ double nominal_resistance(const Description& d, const std::string& body) {
         if (tyre.body == body) force += tyre.weight / tyre.mobility_number;
     }
     for (const Plough& plough : d.ploughs) {
-        if (plough.body == body) force += plough.soil_factor * plough.a * plough.width * plough.depth * 100;
+        if (plough.body == body) force += plough_draft(plough, 0, 1);
     }
     return force;
 }
@@ -123,6 +122,13 @@ Structure build_structure(const Description& d) {
         if (!is_resisted(d, name)) continue;
         s.pairs.push_back({name + ".resistance", PairKind::body_resistance, static_cast<int>(i),
                            {link(name, 1), Link{}}, nominal_resistance(d, name)});
+    }
+
+    for (std::size_t i = 0; i < d.engines.size(); ++i) {
+        const Engine& e = d.engines[i];
+        if (e.stall_speed <= 0 || e.friction_constant <= 0) continue;
+        s.pairs.push_back({e.name + ".friction", PairKind::engine_friction, static_cast<int>(i),
+                           {link(e.mass, 1), Link{}}, e.friction_constant});
     }
 
     for (std::size_t i = 0; i < d.gears.size(); ++i) {

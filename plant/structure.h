@@ -40,6 +40,7 @@ enum class PairKind {
     clutch,           // clutch, brake, Coulomb wheel contact: description.clutches[source]
     rolling,          // rolling moment on a tyre's wheel: description.tyres[source]
     body_resistance,  // motion resistance and draft on a translating mass: description.masses[source]
+    engine_friction,  // of a stalled engine on its mass: description.engines[source]
 };
 
 struct FrictionPair {

@@ -1,0 +1,127 @@
+// Valves, pistons and pedals over one step. They do not feel the mechanics, so they are advanced first.
+#include <algorithm>
+#include <span>
+
+#include "plant/forces.h"
+
+namespace shiftrig::plant::detail {
+namespace {
+
+double input(const Work& w, int index) noexcept {
+    return index < 0 ? 0 : w.scratch.input[static_cast<std::size_t>(index)];
+}
+
+constexpr int hydraulic_slots = 7;  // HydraulicState in the State block, the delay line behind it
+
+HydraulicState read_hydraulic(const double* at) noexcept { return {at[0], at[1], at[2], at[3], at[4], at[5], at[6]}; }
+void write_hydraulic(double* at, const HydraulicState& s) noexcept {
+    const double values[hydraulic_slots] = {s.play, s.head, s.slewed, s.valve, s.valve_rate, s.piston, s.chamber};
+    std::copy(values, values + hydraulic_slots, at);
+}
+
+StepValues constant(double value) noexcept { return {value, value, value}; }
+StepValues complement(const StepValues& y) noexcept { return {1 - y.begin, 1 - y.middle, 1 - y.end}; }
+
+// Faults that override the actuation: stuck open, stuck closed.
+bool stuck_pair(const Work& w, const PairLaw& law, PairLoad& load) noexcept {
+    const double fault = input(w, law.stuck);
+    load.fixed = fault > 0.5;
+    if (load.fixed) load.values = constant(fault > 1.5 ? law.full_load : 0);
+    return load.fixed;
+}
+
+}  // namespace
+
+void advance_actuation(Work& w) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    double* block = w.next;
+    double demand = 0;  // on the pump, by all pistons that fill [m³/s]
+    for (int k = 0; k < m.pairs; ++k) {
+        const PairLaw& law = m.pair_laws[static_cast<std::size_t>(k)];
+        if (!law.hydraulic) continue;
+        demand += fill_demand(*law.hydraulic, w.operators.hydraulics[static_cast<std::size_t>(k)],
+                              law.friction.return_pressure, read_hydraulic(block + law.actuator));
+    }
+    const double pump = m.description.oil ? m.description.oil->pump_flow : 0;
+    const double share = pump > 0 && demand > pump ? pump / demand : 1;
+
+    for (int k = 0; k < m.pairs; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        const PairLaw& law = m.pair_laws[i];
+        PairLoad& load = w.scratch.loads[i];
+        load.scale = 1;
+        switch (law.source) {
+            case LoadSource::constant: load.values = constant(1); break;
+            case LoadSource::input: load.values = constant(input(w, law.command)); break;
+            case LoadSource::release:
+                load.values = complement(advance_lag(law.lag, block[law.actuator], input(w, law.command)));
+                break;
+            case LoadSource::apply:
+                load.values = advance_lag(law.lag, block[law.actuator], input(w, law.command));
+                break;
+            case LoadSource::hydraulic: {
+                HydraulicState state = read_hydraulic(block + law.actuator);
+                const ActuationHydraulic& hydraulic = *law.hydraulic;
+                double command = input(w, law.command);
+                if (hydraulic.solenoid) command = solenoid_pressure(*hydraulic.solenoid, state.play, command);
+                load.hydraulic = advance_hydraulics(
+                    hydraulic, w.operators.hydraulics[i], law.friction.return_pressure, state,
+                    std::span<double>(block + law.actuator + hydraulic_slots, static_cast<std::size_t>(law.delay_slots)),
+                    command, share, input(w, law.valve_stuck) > 0.5);
+                load.scale = 1 - input(w, law.leak);
+                write_hydraulic(block + law.actuator, state);
+                break;
+            }
+            default: break;
+        }
+        stuck_pair(w, law, load);
+    }
+}
+
+void hold_actuation(Work& w) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const double* block = w.state;
+    for (int k = 0; k < m.pairs; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        const PairLaw& law = m.pair_laws[i];
+        PairLoad& load = w.scratch.loads[i];
+        load.scale = 1;
+        switch (law.source) {
+            case LoadSource::constant: load.values = constant(1); break;
+            case LoadSource::input: load.values = constant(input(w, law.command)); break;
+            case LoadSource::release: load.values = constant(1 - block[law.actuator]); break;
+            case LoadSource::apply: load.values = constant(block[law.actuator]); break;
+            case LoadSource::hydraulic: {
+                const HydraulicState state = read_hydraulic(block + law.actuator);
+                load.hydraulic = {};
+                load.hydraulic.valve = constant(state.chamber);
+                load.scale = 1 - input(w, law.leak);
+                break;
+            }
+            default: break;
+        }
+        stuck_pair(w, law, load);
+    }
+}
+
+double pair_load(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {
+    const auto i = static_cast<std::size_t>(pair);
+    const PairLaw& law = w.model.pair_laws[i];
+    const PairLoad& load = w.scratch.loads[i];
+    if (load.fixed) return load.values.begin;
+    if (law.source == LoadSource::waveform) {
+        return load_from_engagement(law.friction, waveform(*law.profile, at.time, at.side));
+    }
+    if (law.source == LoadSource::hydraulic) {
+        // The chamber jumps where the piston arrives: from the left it is still the spring's pressure.
+        const HydraulicStep& step = load.hydraulic;
+        const bool before = at.fraction < step.filled_from ||
+                            (at.side == Side::left && step.jumps() && at.fraction <= step.filled_from);
+        const double pressure =
+            before ? step.spring_begin + (step.spring_end - step.spring_begin) * at.fraction : step.valve.at(at.fraction);
+        return load_from_pressure(law.friction, pressure * load.scale);
+    }
+    return load_from_engagement(law.friction, load.values.at(at.fraction));
+}
+
+}  // namespace shiftrig::plant::detail

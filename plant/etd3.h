@@ -1,0 +1,12 @@
+// The three-stage exponential Runge–Kutta step of order 3 ([Cox]), exact in everything linear. Internal.
+#pragma once
+
+#include "plant/forces.h"
+
+namespace shiftrig::plant::detail {
+
+// From the settled `begin` over `length` seconds in the mode: fills half, late and end, with forces, and
+// the internal torques at the end (a left limit). `end_fraction` is where the end lies in the whole step.
+void advance(Work& work, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME;
+
+}  // namespace shiftrig::plant::detail

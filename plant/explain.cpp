@@ -1,0 +1,43 @@
+#include <cmath>
+#include <cstdio>
+
+#include "plant/model_data.h"
+
+namespace shiftrig::plant {
+
+std::string explain(const Model& model, const Event& event) {
+    const detail::ModelData& m = model.data();
+    const auto device = static_cast<std::size_t>(event.device < 0 ? 0 : event.device);
+    const std::string name = event.device < 0 ? "model" : m.device_names[device];
+    const char* unit = "Nm";
+    char text[256];
+    const auto say = [&](const char* format, auto... values) {
+        std::snprintf(text, sizeof text, format, values...);
+        return std::string(text);
+    };
+    std::string line = say("t=%.7f ", event.time) + name + " ";
+    switch (event.kind) {
+        case EventKind::lock:
+            return line + say("locks: slip %.3g, torque %.1f of %.1f %s static", event.slip, event.torque, event.capacity, unit);
+        case EventKind::break_away:
+            return line + say("breaks away: torque %.1f beyond %.1f %s static", event.torque, event.capacity, unit);
+        case EventKind::engage:
+            return line + say("engages: slip %.3f rad/s, capacity %.1f %s", event.slip, event.capacity, unit);
+        case EventKind::release: return line + say("is free: slip %.3f rad/s", event.slip);
+        case EventKind::mesh_sticks: return line + say("sticks at rest under %.1f %s", event.torque, unit);
+        case EventKind::mesh_releases:
+            return line + say("moves again: torque %.1f, its loss held %.1f %s", event.torque, event.capacity, unit);
+        case EventKind::drive_side:
+            return line + (event.slip < 0 ? "is driven" : "drives") + say(": torque on its first link %.1f %s", event.torque, unit);
+        case EventKind::tie_up:
+            return line + say("is part of a closed loop: the split of %.1f %s is not unique", event.torque, unit);
+        case EventKind::fall_back: return line + "has more state changes in this step than are located: the rest act from the next step on";
+        case EventKind::engine_stalls: return line + say("stalls at %.1f rad/s", event.slip);
+        case EventKind::engine_starts: return line + say("runs at %.1f rad/s", event.slip);
+        case EventKind::facing_warning: return line + say("facing passes its warning temperature: %.0f degC", event.slip);
+        case EventKind::facing_failure: return line + say("facing passes its failure temperature: %.0f degC", event.slip);
+    }
+    return line;
+}
+
+}  // namespace shiftrig::plant

@@ -1,0 +1,51 @@
+// Everything the step needs to know besides linear mechanics: what presses the pairs together over the
+// step, and the forces at an instant. Internal to plant/.
+#pragma once
+
+#include "plant/modes.h"
+#include "plant/samples.h"
+
+namespace shiftrig::plant::detail {
+
+// One step's view of all roles, handed down through its parts.
+struct Work {
+    const ModelData& model;
+    OperatorsData& operators;
+    const double* state;     // the State block
+    double* next;            // the same, to be written; null where one only looks
+    Outputs& outputs;
+    ScratchData& scratch;
+    unsigned char* contact;  // contact states in force, per pair and mesh
+    double start;            // time at the start of the step [s]
+    double h;                // [s]
+};
+
+// Inputs as they act: limited to their ranges, not-a-number taken as the initial value.
+void latch_inputs(Work& work, const Inputs& inputs) SHIFTRIG_REALTIME;
+
+// Valves, pistons, pedals: advances their states over the step and leaves the course of every pair's load.
+void advance_actuation(Work& work) SHIFTRIG_REALTIME;
+// The loads at the present state of the actuators, for a look without a step.
+void hold_actuation(Work& work) SHIFTRIG_REALTIME;
+
+// Load of a pair at an instant: times its friction factor this is its capacity. [Nm]
+double pair_load(const Work& work, int pair, const Instant& at) SHIFTRIG_REALTIME;
+
+// From z and the auxiliary states of the sample, with the contact states `contact`: capacities, forces f,
+// auxiliary rates and powers.
+void evaluate_forces(const Work& work, const unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;
+
+// The part of f that depends on the contact states, from capacities already there.
+void contact_forces(const Work& work, const unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;
+
+// [Algin] eq. (15): M of the active set in `mode` from z and f of the sample.
+void internal_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+
+// What a pair or a mesh slips at: A_kᵀω.
+inline double slip_of(const std::array<Link, 2>& links, const double* speeds) noexcept {
+    double slip = links[0].factor * speeds[links[0].mass];
+    if (links[1].mass >= 0) slip += links[1].factor * speeds[links[1].mass];
+    return slip;
+}
+
+}  // namespace shiftrig::plant::detail

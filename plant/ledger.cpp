@@ -1,0 +1,82 @@
+#include "plant/ledger.h"
+
+#include <algorithm>
+
+#include "plant/transitions.h"
+
+namespace shiftrig::plant::detail {
+namespace {
+
+// Loss of everything but friction pairs at a sample [W].
+double other_losses(const Work& w, const Mode& mode, const Sample& s) {
+    const ModelData& m = w.model;
+    double power = s.field_power;
+    for (int k = 0; k < m.meshes; ++k) {
+        const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
+        const unsigned char state = w.contact[m.pairs + k];
+        if (!mesh.lossy() || state == stuck || mode.bound[m.pairs + k]) continue;
+        // M₁ (ω_1 − û ω_2 − (1 − û) ω_c), of which u in place of û gives nothing.
+        const double carrier = mesh.carrier < 0 ? 0 : s.z[mesh.carrier];
+        const double turning = s.z[mesh.second] - carrier;
+        const double lost_ratio = mesh.ratio - mesh.force_ratio(loss_exponent(state));
+        power += s.torque[m.pairs + k] * lost_ratio * turning;
+        const int bearing = m.bearing_force[static_cast<std::size_t>(k)];
+        if (bearing >= 0) power += s.f[bearing] * mesh.ratio * turning;
+    }
+    const auto damped = [&](const Elastic& e) {
+        if (e.damping == 0) return;
+        const double rate = slip_of(e.links, s.z);
+        power += e.damping * rate * rate;
+    };
+    for (const Elastic& shaft : m.structure.shafts) damped(shaft);
+    for (const Elastic& damper : m.structure.dampers) damped(damper);
+    return power;
+}
+
+}  // namespace
+
+double stored_energy(const ModelData& m, const double* z) SHIFTRIG_REALTIME {
+    double energy = 0;
+    for (int j = 0; j < m.masses; ++j) energy += 0.5 * m.structure.inertia[static_cast<std::size_t>(j)] * z[j] * z[j];
+    for (int e = 0; e < m.twists; ++e) {
+        const double twist = z[m.masses + e];
+        energy += 0.5 * m.structure.shafts[static_cast<std::size_t>(e)].stiffness * twist * twist;
+    }
+    return energy;
+}
+
+void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    Sample &begin = w.scratch.begin, &middle = w.scratch.middle, &end = w.scratch.end;
+    const double h = end.at.time - begin.at.time;
+    sample_rate(w, mode, begin);
+    sample_rate(w, mode, end);
+    for (int i = 0; i < m.states_padded; ++i) {
+        middle.z[i] = 0.5 * (begin.z[i] + end.z[i]) + h / 8 * (begin.rate[i] - end.rate[i]);
+    }
+    for (int i = 0; i < m.auxiliary; ++i) {
+        middle.auxiliary[i] = 0.5 * (begin.auxiliary[i] + end.auxiliary[i]) +
+                              h / 8 * (begin.auxiliary_rate[i] - end.auxiliary_rate[i]);
+    }
+    middle.at = w.scratch.half.at;
+    evaluate_forces(w, w.contact, middle);
+    internal_torques(w, mode, middle);
+
+    const auto simpson = [h](double a, double b, double c) { return h / 6 * (a + 4 * b + c); };
+    for (int k = 0; k < m.pairs; ++k) {
+        if (w.contact[k] == locked) continue;
+        const auto& links = m.structure.pairs[static_cast<std::size_t>(k)].links;
+        const double heat = simpson(begin.f[k] * slip_of(links, begin.z), middle.f[k] * slip_of(links, middle.z),
+                                    end.f[k] * slip_of(links, end.z));
+        w.scratch.heat[static_cast<std::size_t>(k)] += heat;
+        w.scratch.dissipated += heat;
+    }
+    w.scratch.dissipated += simpson(other_losses(w, mode, begin), other_losses(w, mode, middle), other_losses(w, mode, end));
+    w.scratch.input_work += simpson(begin.input_power, middle.input_power, end.input_power);
+    for (std::size_t i = 0; i < m.translating.size(); ++i) {
+        const int j = m.translating[i];
+        w.next[m.layout.distances + static_cast<int>(i)] += simpson(begin.z[j], middle.z[j], end.z[j]);
+    }
+}
+
+}  // namespace shiftrig::plant::detail

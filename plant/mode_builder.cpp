@@ -1,0 +1,285 @@
+// From contact states to the matrices of one mode, see modes.h.
+#include <algorithm>
+#include <cmath>
+
+#include "plant/dense.h"
+#include "plant/modes.h"
+
+namespace shiftrig::plant::detail {
+namespace {
+
+// A column is dependent on others if less than this is left of its unit length after projecting them out.
+constexpr double dependent = 1e-9;
+
+// J^(−1/2)-scaled column of a device, normalised; returns its length before that.
+template <typename Links>
+double scaled_column(const ModelData& m, const Links& links, double* column) {
+    std::fill(column, column + m.masses, 0.);
+    for (const Link& link : links) {
+        if (link.mass >= 0) column[link.mass] += link.factor / m.root_inertia[static_cast<std::size_t>(link.mass)];
+    }
+    const double length = std::sqrt(dot(column, column, m.masses));
+    for (int j = 0; j < m.masses; ++j) column[j] /= length;
+    return length;
+}
+
+void project_out(const double* basis, int rank, int n, double* column) {
+    for (int pass = 0; pass < 2; ++pass) {  // twice is enough
+        for (int k = 0; k < rank; ++k) add_scaled(column, -dot(basis + k * n, column, n), basis + k * n, n);
+    }
+}
+
+// Appends the rest of `column` to the basis if enough is left.
+bool extend_basis(double* basis, int& rank, int n, double* column) {
+    project_out(basis, rank, n, column);
+    const double rest = std::sqrt(dot(column, column, n));
+    if (rest < dependent) return false;
+    for (int j = 0; j < n; ++j) basis[rank * n + j] = column[j] / rest;
+    ++rank;
+    return true;
+}
+
+// Orthonormal basis of `count` columns, the longest remainder first.
+int pivoted_basis(double* columns, int count, int n, double* basis) {
+    int rank = 0;
+    for (int step = 0; step < std::min(count, n); ++step) {
+        int best = -1;
+        double longest = dependent * dependent;
+        for (int c = 0; c < count; ++c) {
+            const double rest = dot(columns + c * n, columns + c * n, n);
+            if (rest > longest) {
+                longest = rest;
+                best = c;
+            }
+        }
+        if (best < 0) break;
+        double* column = columns + best * n;
+        if (!extend_basis(basis, rank, n, column)) break;
+        std::fill(column, column + n, 0.);
+        const double* q = basis + (rank - 1) * n;
+        for (int c = 0; c < count; ++c) add_scaled(columns + c * n, -dot(q, columns + c * n, n), q, n);
+    }
+    return rank;
+}
+
+}  // namespace
+
+ModeSizes::ModeSizes(const ModelData& m) {
+    basis = m.masses * m.masses;
+    mobility = panel_size(m.masses, m.masses);
+    rates = panel_size(m.states, m.columns);
+    torques = panel_size(m.torques, m.columns);
+    operators = panel_size(m.states, m.columns + m.states_padded + 4 * m.forces);
+    key = (m.contact_bytes + 7) / 8 * 8;
+}
+
+StepOperators place_operators(const ModelData& m, double* memory) noexcept {
+    StepOperators o;
+    o.half = memory;
+    o.whole = o.half + panel_size(m.states, m.columns);
+    o.first = o.whole + panel_size(m.states, m.states_padded);
+    o.combined = o.first + panel_size(m.states, m.forces);
+    return o;
+}
+
+void mode_key(const ModelData& m, const unsigned char* contact, unsigned char* key) SHIFTRIG_REALTIME {
+    for (int k = 0; k < m.pairs; ++k) key[k] = contact[k] == locked;
+    for (int k = m.pairs; k < m.contact_bytes; ++k) {
+        key[k] = contact[k] == stuck ? 0 : contact[k] & driven ? 2 : 1;
+    }
+}
+
+int workspace_doubles(const ModelData& m) noexcept {
+    const int n = m.masses, unknowns = m.torques;
+    const int square = m.states_padded * m.states_padded;
+    const int mode = n * unknowns           // columns
+                     + n * unknowns         // force columns
+                     + unknowns * unknowns  // G, H
+                     + 2 * n * unknowns     // T̂, right-hand sides
+                     + unknowns * unknowns  // G again
+                     + padded(n) * n        // B
+                     + 4 * (m.states_padded + m.torques) + m.states_padded * m.columns +
+                     padded(m.torques) * m.columns;
+    const int exponential = 16 * square + 3 * m.states_padded * (m.columns + 4 * m.forces);
+    return std::max(mode, exponential) + 64;
+}
+
+int workspace_integers(const ModelData& m) noexcept { return 2 * m.torques + 8; }
+
+void build_mode(const ModelData& m, Mode& mode, double* workspace, int*) SHIFTRIG_REALTIME {
+    const Structure& s = m.structure;
+    const int n = m.masses;
+    const auto mesh_key = [&](int k) { return mode.key[m.pairs + k]; };
+    double* columns = workspace;
+    double* force = columns + n * m.torques;  // Ĉ scaled by J^(−1/2)
+
+    // The active set: locked pairs and all meshes, then what stuck meshes add to them.
+    mode.row_count = 0;
+    for (int k = 0; k < m.pairs; ++k) {
+        if (mode.key[k]) mode.rows[mode.row_count++] = k;
+    }
+    for (int k = 0; k < m.meshes; ++k) mode.rows[mode.row_count++] = m.pairs + k;
+    for (int r = 0; r < mode.row_count; ++r) {
+        const int unknown = mode.rows[r];
+        if (unknown < m.pairs) {
+            scaled_column(m, s.pairs[static_cast<std::size_t>(unknown)].links, columns + r * n);
+        } else {
+            const Mesh& mesh = s.meshes[static_cast<std::size_t>(unknown - m.pairs)];
+            scaled_column(m, mesh.column(mesh.ratio), columns + r * n);
+        }
+    }
+    mode.base_rank = mode.rank = pivoted_basis(columns, mode.row_count, n, mode.basis);
+
+    double* column = columns;
+    const auto rest = [&] {
+        project_out(mode.basis, mode.rank, n, column);
+        return std::sqrt(dot(column, column, n));
+    };
+    for (int k = 0; k < m.meshes; ++k) {
+        const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
+        scaled_column(m, mesh.motion(), column);
+        mode.bound[m.pairs + k] = rest() < dependent;
+    }
+    for (int k = 0; k < m.meshes; ++k) {
+        const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
+        if (!mesh.lossy() || mesh_key(k) != 0 || mode.bound[m.pairs + k]) continue;
+        scaled_column(m, mesh.motion(), column);
+        if (extend_basis(mode.basis, mode.rank, n, column)) mode.rows[mode.row_count++] = m.pairs + m.meshes + k;
+    }
+    for (int k = 0; k < m.pairs; ++k) {
+        scaled_column(m, s.pairs[static_cast<std::size_t>(k)].links, column);
+        mode.bound[k] = rest() < dependent;
+    }
+    for (int k = 0; k < m.meshes; ++k) {  // moving meshes that stuck ones hold
+        const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
+        scaled_column(m, mesh.motion(), column);
+        if (rest() < dependent) mode.bound[m.pairs + k] |= 2;
+    }
+    const int rows = mode.row_count, rank = mode.rank;
+    mode.redundant = rows > rank;
+
+    // Ĉ, its unknowns scaled to unit columns (square case) or by √W (dependent rows).
+    double heaviest = 0;
+    for (const FrictionPair& pair : s.pairs) heaviest = std::max(heaviest, pair.nominal_capacity);
+    const double mesh_weight = 1e3 * (heaviest > 0 ? heaviest : 1);  // sharing is for friction pairs
+    double* g = force + n * m.torques;
+    double* transmission = g + m.torques * m.torques;  // T̂, rows × masses
+    double* right = transmission + rows * n;
+    double* square = right + rows * n;
+    double* b = square + m.torques * m.torques;         // B, masses × masses, padded
+    double* scale = b + padded(n) * n;
+    for (int r = 0; r < rows; ++r) {
+        const int unknown = mode.rows[r];
+        double* c = force + r * n;
+        double length, weight = mesh_weight;
+        if (unknown < m.pairs) {
+            const FrictionPair& pair = s.pairs[static_cast<std::size_t>(unknown)];
+            length = scaled_column(m, pair.links, c);
+            weight = pair.nominal_capacity;
+        } else if (unknown < m.pairs + m.meshes) {
+            const Mesh& mesh = s.meshes[static_cast<std::size_t>(unknown - m.pairs)];
+            const bool at_rest = mode.bound[m.pairs + unknown - m.pairs] != 0 || mesh_key(unknown - m.pairs) == 0;
+            const int x = at_rest ? 0 : mesh_key(unknown - m.pairs) == 2 ? -1 : 1;
+            length = scaled_column(m, mesh.column(mesh.force_ratio(x)), c);
+        } else {
+            const Mesh& mesh = s.meshes[static_cast<std::size_t>(unknown - m.pairs - m.meshes)];
+            length = scaled_column(
+                m, std::array<Link, 2>{Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}}, c);
+            weight = 1e-6 * mesh_weight;
+        }
+        // c is a unit column; the true one is length·c. Work with √W·length·c in the dependent case.
+        scale[r] = mode.redundant ? std::sqrt(weight) : 1 / length;
+        if (mode.redundant) {
+            for (int j = 0; j < n; ++j) c[j] *= length * scale[r];
+        }
+    }
+    for (int r = 0; r < rows; ++r) {
+        for (int k = 0; k < rank; ++k) g[r * rank + k] = dot(mode.basis + k * n, force + r * n, n);
+    }
+    // right = Qᵀ J^(−1/2), rank × masses
+    for (int j = 0; j < n; ++j) {
+        for (int k = 0; k < rank; ++k) {
+            right[j * rank + k] = mode.basis[k * n + j] / m.root_inertia[static_cast<std::size_t>(j)];
+        }
+    }
+    if (!mode.redundant) {
+        solve(g, rank, right, n);
+        for (int j = 0; j < n; ++j) {
+            for (int r = 0; r < rows; ++r) transmission[j * rows + r] = scale[r] * right[j * rank + r];
+        }
+    } else {
+        for (int k = 0; k < rank; ++k) {
+            for (int l = 0; l < rank; ++l) {
+                double sum = 0;
+                for (int r = 0; r < rows; ++r) sum += g[r * rank + k] * g[r * rank + l];
+                square[l * rank + k] = sum;
+            }
+        }
+        solve(square, rank, right, n);
+        for (int j = 0; j < n; ++j) {
+            for (int r = 0; r < rows; ++r) {
+                transmission[j * rows + r] = scale[r] * dot(g + r * rank, right + j * rank, rank);
+            }
+        }
+    }
+
+    // B = Π₀ J⁻¹ (I − Ĉ T̂), column by column; force still holds scaled columns c with Ĉ = √J · (c/s).
+    const int stride = padded(n);
+    for (int j = 0; j < n; ++j) {
+        double* response = b + j * stride;  // first J^(1/2) ω̇
+        std::fill(response, response + stride, 0.);
+        response[j] = 1 / m.root_inertia[static_cast<std::size_t>(j)];
+        for (int r = 0; r < rows; ++r) {
+            add_scaled(response, -transmission[j * rows + r] / scale[r], force + r * n, n);
+        }
+        project_out(mode.basis, rank, n, response);
+        for (int i = 0; i < n; ++i) response[i] /= m.root_inertia[static_cast<std::size_t>(i)];
+    }
+    to_panels(b, n, n, mode.mobility);
+
+    // L, S̃, R: every elastic element and every force is a column of torques on the masses.
+    const int states = m.states_padded, torque_rows = padded(rows);
+    double* motion = scale + m.torques;               // [L S̃], states × columns
+    double* torque = motion + states * m.columns;     // [R_z R_f]
+    double* response = torque + torque_rows * m.columns;
+    double* reaction = response + states;
+    std::fill(motion, motion + states * m.columns, 0.);
+    std::fill(torque, torque + torque_rows * m.columns, 0.);
+    // What a unit torque out of these links does to the accelerations and to the unknowns.
+    const auto apply = [&](const std::array<Link, 2>& links) {
+        std::fill(response, response + n, 0.);
+        std::fill(reaction, reaction + rows, 0.);
+        for (const Link& link : links) {
+            if (link.mass < 0) continue;
+            add_scaled(response, -link.factor, b + link.mass * stride, n);
+            add_scaled(reaction, -link.factor, transmission + link.mass * rows, rows);
+        }
+    };
+    const auto add_to = [&](int c, double factor) {
+        add_scaled(motion + c * states, factor, response, n);
+        add_scaled(torque + c * torque_rows, factor, reaction, rows);
+    };
+    for (int e = 0; e < m.twists; ++e) {
+        const Elastic& shaft = s.shafts[static_cast<std::size_t>(e)];
+        apply(shaft.links);
+        add_to(n + e, shaft.stiffness);
+        for (const Link& link : shaft.links) {
+            add_to(link.mass, shaft.damping * link.factor);
+            motion[link.mass * states + n + e] = link.factor;  // φ̇
+        }
+    }
+    for (const Elastic& damper : s.dampers) {
+        apply(damper.links);
+        for (const Link& link : damper.links) {
+            if (link.mass >= 0) add_to(link.mass, damper.damping * link.factor);
+        }
+    }
+    for (int k = 0; k < m.forces; ++k) {
+        apply(m.force_columns[static_cast<std::size_t>(k)]);
+        add_to(states + k, 1);
+    }
+    to_panels(motion, m.states, m.columns, mode.rates);
+    to_panels(torque, rows, m.columns, mode.torques);
+}
+
+}  // namespace shiftrig::plant::detail

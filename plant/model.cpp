@@ -1,0 +1,381 @@
+// Builds a Model: indices, laws with their constants, and the names of all signals.
+#include <algorithm>
+#include <cmath>
+
+#include "plant/laws/engine.h"
+#include "plant/laws/hydraulics.h"
+#include "plant/laws/oil.h"
+#include "plant/laws/tyre.h"
+#include "plant/model_data.h"
+#include "plant/modes.h"
+
+namespace shiftrig::plant {
+namespace detail {
+namespace {
+
+int add_input(ModelData& m, const std::string& name, Unit unit, double initial, double minimum, double maximum,
+              const std::string& description) {
+    const auto [at, fresh] = m.input_index.emplace(name, static_cast<int>(m.inputs.size()));
+    if (fresh) m.inputs.push_back({name, unit, initial, minimum, maximum, description});
+    return at->second;
+}
+
+int add_output(ModelData& m, const std::string& name, Unit unit, const std::string& description) {
+    const int index = static_cast<int>(m.outputs.size());
+    m.output_index.emplace(name, index);
+    m.outputs.push_back({name, unit, 0, -1e300, 1e300, description});
+    return index;
+}
+
+int add_switch(ModelData& m, const std::string& name, const std::string& description) {
+    return add_input(m, name, Unit::one, 0, 0, 1, description);
+}
+
+void add_breakpoints(ModelData& m, const Waveform& waveform) {
+    for (const Waveform::Piece& piece : waveform.pieces) {
+        if (piece.from > -1e299) m.breakpoints.push_back(piece.from);
+        if (piece.until < 1e299) m.breakpoints.push_back(piece.until);
+    }
+}
+
+// Current that the characteristic turns into this pressure.
+double current_for(const Solenoid& solenoid, double pressure) {
+    Table inverse;
+    for (const auto& [current, value] : solenoid.pressure_over_current) {
+        if (inverse.empty() || value > inverse.back().first) inverse.push_back({value, current});
+    }
+    return interpolate(inverse, pressure);
+}
+
+PairLaw clutch_law(ModelData& m, const Clutch& c, int& actuator_slots) {
+    PairLaw law;
+    const std::string prefix = "clutch." + c.name + ".";
+    if (const auto* dry = std::get_if<DryFriction>(&c.friction)) {
+        law.friction = friction_law(*dry);
+        law.full_load = load_from_engagement(law.friction, 1);
+    } else {
+        const auto& wet = std::get<WetPlates>(c.friction);
+        law.friction = friction_law(wet);
+        if (c.drag) law.drag = drag_factor(wet);
+    }
+    law.actuator = actuator_slots;
+    const double h = m.options.step_size;
+    if (const auto* direct = std::get_if<ActuationDirect>(&c.actuation)) {
+        if (direct->profile.pieces.empty()) {
+            law.source = LoadSource::input;
+            law.command = add_input(m, prefix + "engagement", Unit::one, direct->initial, 0, 1e6, "share of the nominal capacity");
+        } else {
+            law.source = LoadSource::waveform;
+            law.profile = &direct->profile;
+            add_breakpoints(m, direct->profile);
+        }
+    } else if (const auto* release = std::get_if<ActuationRelease>(&c.actuation)) {
+        law.source = LoadSource::release;
+        law.lag = lag_operator(release->lag, h);
+        law.command = add_input(m, prefix + "release_command", Unit::one, release->initial, 0, 1, "0 closed … 1 released");
+        actuator_slots += 1;
+    } else if (const auto* apply = std::get_if<ActuationApply>(&c.actuation)) {
+        law.source = LoadSource::apply;
+        law.lag = lag_operator(apply->lag, h);
+        law.command = apply->by_driver_brake
+                          ? add_input(m, "driver.brake", Unit::one, apply->initial, 0, 1, "service brake")
+                          : add_input(m, prefix + "application_command", Unit::one, apply->initial, 0, 1, "0 open … 1 applied");
+        actuator_slots += 1;
+    } else if (const auto* hydraulic = std::get_if<ActuationHydraulic>(&c.actuation)) {
+        law.source = LoadSource::hydraulic;
+        law.hydraulic = hydraulic;
+        law.full_load = load_from_pressure(law.friction, hydraulic->maximum_pressure);
+        law.command =
+            hydraulic->solenoid
+                ? add_input(m, prefix + "current_command", Unit::ampere, current_for(*hydraulic->solenoid, hydraulic->initial),
+                            0, hydraulic->solenoid->pressure_over_current.back().first, "solenoid current")
+                : add_input(m, prefix + "pressure_command", Unit::pascal, hydraulic->initial, 0,
+                            hydraulic->maximum_pressure, "valve pressure wanted");
+        law.valve_stuck = add_switch(m, prefix + "valve_stuck", "fault: 1 holds the valve's outlet pressure");
+        law.leak = add_switch(m, prefix + "leak", "fault: share of the chamber pressure lost");
+        law.delay_slots = static_cast<int>(delay_slots(*hydraulic, m.description.oil ? &*m.description.oil : nullptr, h));
+        actuator_slots += 7 + law.delay_slots;
+    } else {
+        law.source = LoadSource::constant;
+    }
+    law.stuck = add_input(m, prefix + "stuck", Unit::one, 0, 0, 2, "fault: 1 stuck open, 2 stuck closed");
+    if (c.heat) {
+        law.heat = &*c.heat;
+        law.heat_operator = heat_operator(*c.heat, h);
+    }
+    return law;
+}
+
+void build_laws(ModelData& m) {
+    const Description& d = m.description;
+    const Structure& s = m.structure;
+    int actuator_slots = 0, heated = 0;
+    for (const FrictionPair& pair : s.pairs) {
+        PairLaw law;
+        switch (pair.kind) {
+            case PairKind::clutch: law = clutch_law(m, d.clutches[static_cast<std::size_t>(pair.source)], actuator_slots); break;
+            case PairKind::rolling:
+                law.source = LoadSource::rolling;
+                law.full_load = rolling_moment(d.tyres[static_cast<std::size_t>(pair.source)]);
+                break;
+            case PairKind::body_resistance: law.source = LoadSource::resistance; break;
+            case PairKind::engine_friction: law.source = LoadSource::engine; break;
+        }
+        if (law.heat) law.temperature = 2 * heated++;
+        m.pair_laws.push_back(law);
+    }
+    m.layout.actuators = actuator_slots;  // sizes for now, offsets in build_layout
+    m.layout.temperatures = 2 * heated;
+
+    if (!d.engines.empty()) m.throttle = add_input(m, "driver.throttle", Unit::one, 0, 0, 1, "sets the engine's no-load speed");
+    for (const BrixiusTyre& tyre : d.tyres) {
+        m.tyres.push_back({s.mass(tyre.wheel), s.mass(tyre.body),
+                           add_input(m, "environment.mobility_number", Unit::one, tyre.mobility_number, 1, 1e4, "Brixius number of the soil")});
+    }
+    for (const TorqueConverter& c : d.converters) m.converters.push_back({s.mass(c.pump), s.mass(c.turbine)});
+    for (const Engine& e : d.engines) {
+        const std::string prefix = "engine." + e.name + ".";
+        EngineLaw law;
+        law.mass = s.mass(e.mass);
+        law.pair = s.pair(e.name + ".friction");
+        law.peak = largest_value(e.full_load);
+        law.start = add_switch(m, prefix + "start", "rising edge starts a stalled engine");
+        law.speed_request_enable = add_switch(m, prefix + "speed_request_enable", "1: hold the speed request");
+        law.speed_request = add_input(m, prefix + "speed_request", Unit::radian_per_second, 0, 0, 1e4, "speed control");
+        law.torque_limit = add_input(m, prefix + "torque_limit", Unit::one, 1, 0, 1, "of the full-load peak");
+        law.fuel_cut = add_switch(m, prefix + "fuel_cut", "1: no fuel");
+        m.engines.push_back(law);
+    }
+    for (const TorqueSource& source : d.sources) {
+        SourceLaw law{s.mass(source.mass), -1};
+        if (source.input) law.input = add_input(m, "source." + source.name + ".torque", Unit::newton_metre, 0, -1e9, 1e9, "test-bench torque");
+        add_breakpoints(m, source.waveform);
+        m.sources.push_back(law);
+    }
+    for (const Road& road : d.roads) {
+        m.grade = add_input(m, "environment.grade", Unit::one, 0, -10, 10, "slope of the road, positive uphill");
+        m.road_mass.push_back(s.mass(road.body));
+    }
+    for (const Plough& plough : d.ploughs) {
+        m.draft = add_input(m, "environment.draft", Unit::one, 0, 0, 10, "plough 0 out … 1 in the ground");
+        m.plough_mass.push_back(s.mass(plough.body));
+        m.plough_pair.push_back(s.pair(plough.body + ".resistance"));
+    }
+    if (d.oil) m.oil_temperature = add_input(m, "environment.oil_temperature", Unit::celsius, d.oil->initial_temperature, -40, 200, "transmission oil");
+    for (const SpeedSensor& sensor : d.sensors) {
+        const std::string prefix = "sensor." + sensor.name + ".";
+        SensorLaw law;
+        law.mass = s.mass(sensor.mass);
+        law.bias = add_input(m, prefix + "bias", Unit::radian_per_second, 0, -1e6, 1e6, "fault: added to the reading");
+        law.noise = add_input(m, prefix + "noise", Unit::radian_per_second, 0, 0, 1e6, "fault: standard deviation");
+        law.stuck = add_switch(m, prefix + "stuck", "fault: 1 holds the reading");
+        law.dropout = add_switch(m, prefix + "dropout", "fault: 1 reads 0");
+        law.missing_teeth = add_input(m, prefix + "missing_teeth", Unit::one, 0, 0, 1000, "fault: teeth without an edge per turn");
+        m.sensors.push_back(law);
+    }
+    std::sort(m.breakpoints.begin(), m.breakpoints.end());
+    m.breakpoints.erase(std::unique(m.breakpoints.begin(), m.breakpoints.end()), m.breakpoints.end());
+}
+
+void build_sizes(ModelData& m) {
+    const Structure& s = m.structure;
+    m.masses = s.masses();
+    m.twists = static_cast<int>(s.shafts.size());
+    m.pairs = static_cast<int>(s.pairs.size());
+    m.meshes = static_cast<int>(s.meshes.size());
+    m.states = m.masses + m.twists;
+    m.states_padded = padded(m.states);
+    m.torques = m.pairs + 2 * m.meshes;
+    m.contact_bytes = m.pairs + m.meshes;
+    m.auxiliary = static_cast<int>(m.description.tyres.size() + 2 * m.description.engines.size());
+    for (double inertia : s.inertia) m.root_inertia.push_back(std::sqrt(inertia));
+    for (int j = 0; j < m.masses; ++j) {
+        if (m.description.masses[static_cast<std::size_t>(j)].motion == Motion::translating) m.translating.push_back(j);
+    }
+
+    for (const FrictionPair& pair : s.pairs) m.force_columns.push_back(pair.links);
+    for (const Mesh& mesh : s.meshes) {
+        const bool bearing = mesh.forward_bearing > 0 || mesh.backward_bearing > 0;
+        m.bearing_force.push_back(bearing ? static_cast<int>(m.force_columns.size()) : -1);
+        if (bearing) m.force_columns.push_back({Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}});
+    }
+    m.external_force.assign(static_cast<std::size_t>(m.masses), -1);
+    const auto external = [&](int mass) {
+        int& index = m.external_force[static_cast<std::size_t>(mass)];
+        if (index >= 0) return;
+        index = static_cast<int>(m.force_columns.size());
+        m.force_columns.push_back({Link{mass, -1}, Link{}});  // into the mass
+    };
+    for (const TyreLaw& tyre : m.tyres) {
+        external(tyre.wheel);
+        external(tyre.body);
+    }
+    for (const ConverterLaw& converter : m.converters) {
+        external(converter.pump);
+        external(converter.turbine);
+    }
+    for (const EngineLaw& engine : m.engines) external(engine.mass);
+    for (const SourceLaw& source : m.sources) external(source.mass);
+    for (int body : m.road_mass) external(body);
+    m.forces = static_cast<int>(m.force_columns.size());
+    m.columns = m.states_padded + m.forces;
+}
+
+void build_layout(ModelData& m) {
+    StateLayout& at = m.layout;
+    const int actuators = at.actuators, temperatures = at.temperatures;
+    int next = StateLayout::header;
+    const auto take = [&next](int slots) { return std::exchange(next, next + slots); };
+    at.speeds = take(m.masses);
+    at.twists = take(m.twists);
+    at.distances = take(static_cast<int>(m.translating.size()));
+    at.auxiliary = take(m.auxiliary);
+    at.contact = take((m.contact_bytes + 7) / 8);
+    at.actuators = take(actuators);
+    at.heat = take(m.pairs);
+    at.temperatures = take(temperatures);
+    at.energy = take(3);
+    at.engines = take(3 * static_cast<int>(m.engines.size()));
+    at.sensors = take(4 * static_cast<int>(m.sensors.size()));
+    at.tie_up = take(1);
+    at.size = next;
+    for (PairLaw& law : m.pair_laws) {
+        if (law.actuator >= 0) law.actuator += at.actuators;
+        if (law.temperature >= 0) law.temperature += at.temperatures;
+    }
+}
+
+void build_outputs(ModelData& m) {
+    const Description& d = m.description;
+    const Structure& s = m.structure;
+    OutputLayout& at = m.output_layout;
+    const auto add = [&](const std::string& name, Unit unit, const char* text) { return add_output(m, name, unit, text); };
+    for (const Mass& mass : d.masses) {
+        at.mass.push_back(add("mass." + mass.name + ".speed",
+                              mass.motion == Motion::rotating ? Unit::radian_per_second : Unit::metre_per_second, "speed"));
+    }
+    for (const Elastic& shaft : s.shafts) {
+        at.shaft.push_back(add("shaft." + shaft.name + ".torque", Unit::newton_metre, "torque on the first link"));
+        add("shaft." + shaft.name + ".twist", Unit::radian, "twist, positive where the first link is ahead");
+    }
+    for (std::size_t k = 0; k < s.pairs.size(); ++k) {
+        const FrictionPair& pair = s.pairs[k];
+        at.pressure.push_back(-1);
+        at.temperature.push_back(-1);
+        if (pair.kind != PairKind::clutch) {
+            at.pair.push_back(-1);
+            continue;
+        }
+        const std::string prefix = "clutch." + pair.name + ".";
+        at.pair.push_back(add(prefix + "torque", Unit::newton_metre, "torque on the first link"));
+        add(prefix + "slip", Unit::radian_per_second, "slip speed, first link minus second");
+        add(prefix + "capacity", Unit::newton_metre, "sliding capacity at the present slip");
+        add(prefix + "state", Unit::one, "0 locked, 1 slipping, 2 free");
+        add(prefix + "heat_power", Unit::watt, "friction power");
+        add(prefix + "heat", Unit::joule, "friction heat since start");
+        if (m.pair_laws[k].hydraulic) at.pressure[k] = add(prefix + "pressure", Unit::pascal, "chamber pressure");
+        if (m.pair_laws[k].heat) at.temperature[k] = add(prefix + "temperature", Unit::celsius, "facing surface");
+    }
+    for (const Mesh& mesh : s.meshes) {
+        const std::string prefix = (mesh.planetary ? "row." : "gear.") + mesh.name + ".";
+        if (mesh.planetary) {
+            at.mesh.push_back(add(prefix + "sun", Unit::newton_metre, "torque from the sun into the row"));
+            add(prefix + "ring", Unit::newton_metre, "torque from the ring into the row");
+            add(prefix + "carrier", Unit::newton_metre, "torque from the carrier into the row");
+            add(prefix + "direction", Unit::one, "x: +1 the sun drives, -1 it is driven, 0 at rest");
+        } else {
+            at.mesh.push_back(add(prefix + "torque", Unit::newton_metre, "torque from the first link into the gear"));
+            add(prefix + "direction", Unit::one, "x: +1 the first link drives, -1 it is driven, 0 at rest");
+            add(prefix + "power", Unit::watt, "power into the first link");
+        }
+    }
+    for (const BrixiusTyre& tyre : d.tyres) {
+        at.tyre.push_back(add("tyre." + tyre.name + ".force", Unit::newton, "force of the wheel on the body"));
+        add("tyre." + tyre.name + ".slip", Unit::one, "slip, positive when driving");
+    }
+    for (const TorqueConverter& c : d.converters) {
+        at.converter.push_back(add("converter." + c.name + ".pump_torque", Unit::newton_metre, "from the pump into the converter"));
+        add("converter." + c.name + ".turbine_torque", Unit::newton_metre, "from the converter to the turbine");
+    }
+    for (const Engine& e : d.engines) {
+        at.engine.push_back(add("engine." + e.name + ".torque", Unit::newton_metre, "net torque on the crankshaft"));
+        add("engine." + e.name + ".load", Unit::one, "of full load at this speed");
+        add("engine." + e.name + ".stalled", Unit::one, "1: stalled");
+    }
+    for (int j : m.translating) {
+        const std::string prefix = "body." + s.mass_names[static_cast<std::size_t>(j)] + ".";
+        at.body.push_back(add(prefix + "acceleration", Unit::metre_per_second2, "acceleration"));
+        add(prefix + "distance", Unit::metre, "way since start");
+    }
+    for (const Plough& p : d.ploughs) at.plough.push_back(add("plough." + p.name + ".draft", Unit::newton, "force that resists the body"));
+    for (const SpeedSensor& sensor : d.sensors) at.sensor.push_back(add("sensor." + sensor.name + ".speed", Unit::radian_per_second, "reading"));
+    if (d.oil) {
+        at.oil = add("oil.temperature", Unit::celsius, "oil temperature");
+        add("oil.viscosity", Unit::one, "dynamic viscosity in Pa s");
+    }
+    at.energy = add("energy.input", Unit::joule, "work of engines, sources, grade and air since start");
+    add("energy.stored", Unit::joule, "kinetic and strain energy");
+    add("energy.dissipated", Unit::joule, "friction, mesh losses, damping, tyres, converters since start");
+    add("energy.defect", Unit::joule, "stored minus start minus input plus dissipated");
+    at.certificate = add("certificate.torque_residual", Unit::one, "of the internal torques, relative");
+    add("certificate.constraint_violation", Unit::one, "worst speed difference across a rigid device, rad/s");
+    add("certificate.energy_defect", Unit::joule, "of this step");
+    add("certificate.events", Unit::one, "state changes located inside this step");
+    add("certificate.fall_backs", Unit::one, "state changes deferred to the end of this step");
+    add("certificate.mode_lookups", Unit::one, "modes asked for");
+    add("certificate.mode_misses", Unit::one, "modes built");
+    add("certificate.flags", Unit::one, "bit 0 tie-up, bit 1 direction search gave up, bit 2 not finite");
+}
+
+}  // namespace
+}  // namespace detail
+
+Model::Model(std::unique_ptr<detail::ModelData> data) : data_(std::move(data)) {}
+Model::Model(Model&&) noexcept = default;
+Model& Model::operator=(Model&&) noexcept = default;
+Model::~Model() = default;
+
+Model Model::build(const Description& description, const BuildOptions& options) {
+    auto data = std::make_unique<detail::ModelData>();
+    detail::ModelData& m = *data;
+    m.description = description;
+    m.options = options;
+    if (!(options.step_size > 0) || !std::isfinite(options.step_size)) {
+        throw ModelError("model", description.name, "step_size", "= " + std::to_string(options.step_size) + "; must be > 0");
+    }
+    m.kernel = detail::choose_kernel(options.kernel);
+    m.structure = build_structure(m.description);
+    detail::build_laws(m);
+    detail::build_sizes(m);
+    detail::build_layout(m);
+    detail::build_outputs(m);
+    for (const FrictionPair& pair : m.structure.pairs) m.device_names.push_back(pair.name);
+    for (const Mesh& mesh : m.structure.meshes) m.device_names.push_back(mesh.name);
+    for (const Engine& engine : m.description.engines) m.device_names.push_back(engine.name);
+    return Model(std::move(data));
+}
+
+double Model::step_size() const noexcept { return data_->options.step_size; }
+std::string_view Model::kernel() const noexcept { return data_->kernel.name; }
+std::string_view Model::engine() const noexcept { return "etd3"; }
+const Description& Model::description() const noexcept { return data_->description; }
+const std::vector<Signal>& Model::inputs() const noexcept { return data_->inputs; }
+const std::vector<Signal>& Model::outputs() const noexcept { return data_->outputs; }
+const std::vector<std::string>& Model::device_names() const noexcept { return data_->device_names; }
+std::size_t Model::state_size() const noexcept { return static_cast<std::size_t>(data_->layout.size) * sizeof(double); }
+
+int Model::input(std::string_view name) const noexcept {
+    const auto at = data_->input_index.find(name);
+    return at == data_->input_index.end() ? -1 : at->second;
+}
+int Model::output(std::string_view name) const noexcept {
+    const auto at = data_->output_index.find(name);
+    return at == data_->output_index.end() ? -1 : at->second;
+}
+
+Inputs::Inputs(const Model& model) {
+    for (const Signal& signal : model.inputs()) value.push_back(signal.initial);
+}
+Outputs::Outputs(const Model& model) : value(model.outputs().size(), 0.) {}
+
+}  // namespace shiftrig::plant

@@ -1,0 +1,102 @@
+// What a Model holds: the description, its structure, and everything worked out from them once, so that a
+// step only adds and multiplies. Internal to plant/.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "plant/kernels.h"
+#include "plant/laws/friction.h"
+#include "plant/laws/heat.h"
+#include "plant/laws/lag.h"
+#include "plant/plant.h"
+#include "plant/state_layout.h"
+#include "plant/structure.h"
+
+namespace shiftrig::plant::detail {
+
+// What presses a friction pair together, and where that comes from.
+enum class LoadSource { constant, waveform, input, release, apply, hydraulic, rolling, resistance, engine };
+
+struct PairLaw {
+    LoadSource source{};
+    FrictionLaw friction;
+    double drag = 0;           // of the open clutch, per viscosity and slip [m³]
+    double full_load = 0;      // load at full engagement, for a pair stuck closed [Nm]
+    const Waveform* profile = nullptr;
+    const ActuationHydraulic* hydraulic = nullptr;
+    LagOperator lag;
+    int actuator = -1;         // offset in the State block
+    int delay_slots = 0;       // of a hydraulic actuator
+    int command = -1, stuck = -1, valve_stuck = -1, leak = -1;  // inputs
+    int temperature = -1;      // offset in the State block
+    const FacingHeat* heat = nullptr;
+    HeatOperator heat_operator;
+};
+
+struct TyreLaw {
+    int wheel = -1, body = -1, mobility = -1;
+};
+struct ConverterLaw {
+    int pump = -1, turbine = -1;
+};
+struct EngineLaw {
+    int mass = -1, pair = -1;
+    double peak = 0;  // of the full-load curve [Nm]
+    int start = -1, speed_request_enable = -1, speed_request = -1, torque_limit = -1, fuel_cut = -1;
+};
+struct SourceLaw {
+    int mass = -1, input = -1;
+};
+struct SensorLaw {
+    int mass = -1;
+    int bias = -1, noise = -1, stuck = -1, dropout = -1, missing_teeth = -1;
+};
+
+// Outputs in groups: index of the first signal of each device.
+struct OutputLayout {
+    std::vector<int> mass, shaft, pair, mesh, tyre, converter, engine, body, plough, sensor;
+    std::vector<int> pressure, temperature;  // per pair, −1 if it has none
+    int oil = -1, energy = -1, certificate = -1;
+};
+
+struct ModelData {
+    Description description;
+    BuildOptions options;
+    Structure structure;
+    Kernel kernel;
+
+    // z = [ω; φ], padded to whole panels; f = [pairs; bearing friction of meshes; external torques].
+    int masses = 0, twists = 0, pairs = 0, meshes = 0;
+    int states = 0, states_padded = 0;
+    int forces = 0;                       // m
+    int columns = 0;                      // states_padded + m, what an operator multiplies
+    int torques = 0;                      // unknowns: pairs, meshes, losses of stuck meshes
+    int auxiliary = 0;                    // tyre slips, engine torque and boost
+    int contact_bytes = 0;                // pairs + meshes
+    std::vector<std::array<Link, 2>> force_columns;  // how f_k acts *out of* the masses (SDM sign)
+    std::vector<int> bearing_force;       // per mesh, −1: none
+    std::vector<int> external_force;      // per mass, −1: none
+    std::vector<double> root_inertia;     // √J
+    std::vector<int> translating;         // masses
+
+    std::vector<PairLaw> pair_laws;
+    std::vector<TyreLaw> tyres;
+    std::vector<ConverterLaw> converters;
+    std::vector<EngineLaw> engines;
+    std::vector<SourceLaw> sources;
+    std::vector<int> road_mass;           // per road
+    std::vector<int> plough_mass, plough_pair;  // per plough: body, its resistance
+    std::vector<SensorLaw> sensors;
+    std::vector<double> breakpoints;      // of all waveforms, sorted [s]
+
+    std::vector<Signal> inputs, outputs;
+    std::map<std::string, int, std::less<>> input_index, output_index;
+    std::vector<std::string> device_names;  // friction pairs, meshes, engines
+    int throttle = -1, brake = -1, grade = -1, draft = -1, oil_temperature = -1;
+    OutputLayout output_layout;
+    StateLayout layout;
+};
+
+}  // namespace shiftrig::plant::detail

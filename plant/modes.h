@@ -1,0 +1,93 @@
+// One contact mode = one linear system, and its operators for a step of any length. Internal to plant/.
+//
+//   ω̇ = B M̃,  B = Π₀ J⁻¹(I − Ĉ T̂),   M_R = T̂ M̃,   M̃ = S f − A_E (K φ + D A_Eᵀ ω)      [Algin] eq. (14), (15)
+//   ż = L z + S̃ f,  M_R = R_z z + R_f f
+//
+// with the active rigid set (locked pairs, meshes, stuck meshes), C its kinematic and Ĉ its force columns.
+// T̂ = G⁺ Qᵀ J^(−1/2), G = Qᵀ J^(−1/2) Ĉ, and Q an orthonormal basis of J^(−1/2) C: dependent rows (tie-up)
+// fall away by themselves; G⁺ is then the minimum-norm inverse weighted with the nominal capacities.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "plant/contact.h"
+#include "plant/model_data.h"
+#include "plant/samples.h"
+
+namespace shiftrig::plant::detail {
+
+// Operators of the three-stage exponential step over one length of time (etd3.cpp).
+struct StepOperators {
+    double length = 0;           // [s]
+    double* half = nullptr;      // [P_h Q_h]            panels, states × columns
+    double* whole = nullptr;     // P                    panels, states × states
+    double* first = nullptr;     // Q_1                  panels, states × forces
+    double* combined = nullptr;  // Q1−3Q2+4Q3, 4Q2−8Q3, 4Q3−Q2   panels, states × 3 forces
+};
+
+struct Mode {
+    std::uint64_t last_use = 0;      // 0: empty
+    unsigned char* key = nullptr;    // per pair 1 locked; per mesh 0 stuck, 1 x = +1, 2 x = −1
+    unsigned char* bound = nullptr;  // per pair and mesh: its slip is held at zero by others of the active set
+    int* rows = nullptr;             // active torque row → unknown (pair, mesh, loss of mesh)
+    int row_count = 0;
+    int base_rank = 0;               // of locked pairs and meshes
+    int rank = 0;                    // with stuck meshes
+    bool redundant = false;          // more unknowns than independent rows: the split is not unique
+    double* basis = nullptr;         // Q, masses × rank
+    double* mobility = nullptr;      // B                 panels, masses × masses
+    double* rates = nullptr;         // [L S̃]             panels, states × columns
+    double* torques = nullptr;       // [R_z R_f]         panels, rows × columns
+    StepOperators step;              // for the model's step size
+};
+
+// Room that a mode and its operators take, in doubles and ints.
+struct ModeSizes {
+    int basis = 0, mobility = 0, rates = 0, torques = 0, operators = 0;
+    int key = 0;  // bytes, a multiple of 8
+    explicit ModeSizes(const ModelData& model);
+    int doubles() const noexcept { return basis + mobility + rates + torques + operators; }
+};
+
+StepOperators place_operators(const ModelData& model, double* memory) noexcept;
+
+// Doubles and ints of working memory that build_mode and build_step_operators need.
+int workspace_doubles(const ModelData& model) noexcept;
+int workspace_integers(const ModelData& model) noexcept;
+
+void mode_key(const ModelData& model, const unsigned char* contact, unsigned char* key) SHIFTRIG_REALTIME;
+
+// Everything of a mode but its step operators. `mode.key` is set by the caller.
+void build_mode(const ModelData& model, Mode& mode, double* workspace, int* integers) SHIFTRIG_REALTIME;
+
+// The operators of one step of `length` in the mode.
+void build_step_operators(const ModelData& model, const Mode& mode, double length, StepOperators& operators,
+                          double* workspace) SHIFTRIG_REALTIME;
+
+// The cache: a table of bounded size, least recently used goes.
+struct OperatorsData {
+    explicit OperatorsData(const ModelData& model);
+    std::vector<double> memory;
+    std::vector<unsigned char> bytes;
+    std::vector<int> integers;
+    std::vector<Mode> modes;
+    std::uint64_t clock = 0;
+    Mode* recent = nullptr;
+    std::vector<unsigned char> wanted;  // key being looked up
+    // Hydraulic operators by oil temperature, a pure function of it and h.
+    double oil_temperature = 0;
+    bool oil_known = false;
+    OilEffects oil;
+    std::vector<HydraulicOperator> hydraulics;  // per pair
+    std::int64_t lookups = 0, misses = 0;       // since construction
+};
+
+// The mode of these contact states, from the table or built now.
+Mode& find_mode(const ModelData& model, OperatorsData& operators, const unsigned char* contact,
+                ScratchData& scratch) SHIFTRIG_REALTIME;
+
+// The hydraulic operators at this oil temperature.
+void at_oil_temperature(const ModelData& model, OperatorsData& operators, double temperature) SHIFTRIG_REALTIME;
+
+}  // namespace shiftrig::plant::detail

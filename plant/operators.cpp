@@ -1,0 +1,95 @@
+// The table of modes: bounded, least recently used goes. A mode is a pure function of model, step size and
+// contact states, so forgetting one costs time, never bits.
+#include <algorithm>
+#include <cstring>
+
+#include "plant/modes.h"
+
+namespace shiftrig::plant {
+namespace detail {
+namespace {
+
+constexpr std::size_t memory_budget = std::size_t{96} << 20;  // [bytes]
+constexpr int most_modes = 256, fewest_modes = 12;
+
+}  // namespace
+
+OperatorsData::OperatorsData(const ModelData& m) {
+    const ModeSizes sizes(m);
+    const auto per_mode = static_cast<std::size_t>(sizes.doubles());
+    const auto affordable = static_cast<int>(memory_budget / (8 * per_mode + 1));
+    const auto count = static_cast<std::size_t>(std::clamp(affordable, fewest_modes, most_modes));
+    memory.assign(count * per_mode, 0.);
+    const auto key_bytes = static_cast<std::size_t>(sizes.key);
+    bytes.assign(count * 2 * key_bytes, 0);
+    const auto rows = static_cast<std::size_t>(m.torques);
+    integers.assign(count * rows, 0);
+    modes.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        Mode& mode = modes[i];
+        double* at = memory.data() + i * per_mode;
+        mode.basis = at;
+        mode.mobility = mode.basis + sizes.basis;
+        mode.rates = mode.mobility + sizes.mobility;
+        mode.torques = mode.rates + sizes.rates;
+        mode.step = place_operators(m, mode.torques + sizes.torques);
+        mode.key = bytes.data() + i * 2 * key_bytes;
+        mode.bound = mode.key + key_bytes;
+        mode.rows = integers.data() + i * rows;
+    }
+    wanted.assign(key_bytes, 0);
+    hydraulics.resize(static_cast<std::size_t>(m.pairs));
+}
+
+Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* contact,
+                ScratchData& scratch) SHIFTRIG_REALTIME {
+    ++o.lookups;
+    mode_key(m, contact, o.wanted.data());
+    const std::size_t bytes = o.wanted.size();
+    if (o.recent && std::memcmp(o.recent->key, o.wanted.data(), bytes) == 0) {
+        o.recent->last_use = ++o.clock;
+        return *o.recent;
+    }
+    Mode* oldest = o.modes.data();
+    for (Mode& mode : o.modes) {
+        if (mode.last_use > 0 && std::memcmp(mode.key, o.wanted.data(), bytes) == 0) {
+            mode.last_use = ++o.clock;
+            o.recent = &mode;
+            return mode;
+        }
+        if (mode.last_use < oldest->last_use) oldest = &mode;
+    }
+    ++o.misses;
+    std::memcpy(oldest->key, o.wanted.data(), bytes);
+    build_mode(m, *oldest, scratch.workspace.data(), scratch.workspace_index.data());
+    build_step_operators(m, *oldest, m.options.step_size, oldest->step, scratch.workspace.data());
+    oldest->last_use = ++o.clock;
+    o.recent = oldest;
+    return *oldest;
+}
+
+void at_oil_temperature(const ModelData& m, OperatorsData& o, double temperature) SHIFTRIG_REALTIME {
+    if (o.oil_known && o.oil_temperature == temperature) return;
+    o.oil_temperature = temperature;
+    o.oil_known = true;
+    o.oil = m.description.oil ? oil_effects(*m.description.oil, temperature) : OilEffects{};
+    for (int k = 0; k < m.pairs; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        const PairLaw& law = m.pair_laws[i];
+        if (law.hydraulic) o.hydraulics[i] = hydraulic_operator(*law.hydraulic, o.oil, m.options.step_size);
+    }
+}
+
+}  // namespace detail
+
+Operators::Operators(const Model& model) : data_(std::make_unique<detail::OperatorsData>(model.data())) {}
+Operators::~Operators() = default;
+Operators::Operators(Operators&&) noexcept = default;
+
+void Operators::drop() noexcept {
+    for (detail::Mode& mode : data_->modes) mode.last_use = 0;
+    data_->recent = nullptr;
+    data_->oil_known = false;
+}
+
+}  // namespace shiftrig::plant

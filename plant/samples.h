@@ -1,0 +1,68 @@
+// The quantities of one instant inside a step, and the working memory that holds the few instants a step
+// looks at. Internal to plant/; nothing here survives a step.
+#pragma once
+
+#include <vector>
+
+#include "plant/laws/engine.h"
+#include "plant/laws/hydraulics.h"
+#include "plant/laws/tyre.h"
+#include "plant/laws/waveform.h"
+#include "plant/model_data.h"
+
+namespace shiftrig::plant::detail {
+
+// Where in the step, and from which side laws that jump are taken.
+struct Instant {
+    double time = 0;      // [s]
+    double fraction = 0;  // of the whole step, 0…1
+    Side side = Side::right;
+};
+
+struct Sample {
+    Instant at;
+    double* z = nullptr;         // [ω; φ; padding], followed without a gap by
+    double* f = nullptr;         // forces: what an operator multiplies is z and f in one
+    double* auxiliary = nullptr;
+    double* auxiliary_rate = nullptr;
+    double* sliding = nullptr;   // per pair: sliding capacity at its slip [Nm]
+    double* holding = nullptr;   // per pair: static capacity [Nm]
+    double* torque = nullptr;    // M of pairs, meshes, then loss torques of stuck meshes [Nm]
+    double* rate = nullptr;      // ż
+    double* tyre_force = nullptr;  // per tyre [N]
+    double* tyre_slip = nullptr;   // per tyre [1]
+    double* converter = nullptr;   // pump, turbine torque per converter [Nm]
+    double* engine_torque = nullptr;  // per engine [Nm]
+    double input_power = 0;      // of engines, sources, grade and air [W]
+    double field_power = 0;      // dissipated in tyres and converters [W]
+};
+
+// What presses a pair together over the whole step.
+struct PairLoad {
+    StepValues values;        // engagement, or the load itself where a fault fixes it
+    HydraulicStep hydraulic;
+    double scale = 1;         // leak: share of the chamber pressure that is left
+    bool fixed = false;       // stuck: `values` is the load
+};
+
+struct ScratchData {
+    explicit ScratchData(const ModelData& model);
+    std::vector<double> buffer;
+    Sample begin, half, late, end, middle;
+    std::vector<double> input;       // latched, limited
+    std::vector<PairLoad> loads;
+    std::vector<TyreSoil> soils;
+    std::vector<EngineInput> engine_inputs;
+    std::vector<unsigned char> before, trial, changed, violations;  // contact bytes
+    std::vector<signed char> family;
+    std::vector<double> vector_a, vector_b, vector_c;  // padded masses, states, torques or 3 × forces
+    std::vector<double> torque_copy;
+    std::vector<double> heat;        // per pair in this step [J]
+    double dissipated = 0, input_work = 0;  // in this step [J]
+    double viscosity = 0, oil_temperature = 0;
+    std::vector<double> workspace;   // of the mode builder
+    std::vector<int> workspace_index;
+    std::vector<double> operator_memory;
+};
+
+}  // namespace shiftrig::plant::detail

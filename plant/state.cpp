@@ -1,0 +1,195 @@
+// Where a run begins: the State block of a description, and of a machine already in motion.
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "plant/contact.h"
+#include "plant/laws/engine.h"
+#include "plant/laws/hydraulics.h"
+#include "plant/ledger.h"
+#include "plant/model_data.h"
+
+namespace shiftrig::plant {
+namespace {
+
+using detail::ModelData;
+
+constexpr double at_rest = 1e-9;  // [rad/s]
+
+// The speeds nearest to `wanted` (in the sense of kinetic energy, so that momentum is conserved) for which
+// the named columns slip at zero and the pinned masses turn as told.
+Eigen::VectorXd compatible_speeds(const ModelData& m, const Eigen::VectorXd& wanted, const std::vector<int>& locked,
+                                  bool untwisted, const std::vector<std::pair<int, double>>& pinned) {
+    const Structure& s = m.structure;
+    const Eigen::MatrixXd pairs = s.pair_columns(), meshes = s.mesh_columns(), shafts = s.shaft_columns();
+    const auto n = static_cast<Eigen::Index>(m.masses);
+    const Eigen::Index rows = static_cast<Eigen::Index>(locked.size() + pinned.size()) + meshes.cols() +
+                              (untwisted ? shafts.cols() : 0);
+    if (rows == 0) return wanted;
+    Eigen::MatrixXd c(rows, n);
+    Eigen::VectorXd value = Eigen::VectorXd::Zero(rows);
+    Eigen::Index row = 0;
+    for (int k : locked) c.row(row++) = pairs.col(k).transpose();
+    for (Eigen::Index k = 0; k < meshes.cols(); ++k) c.row(row++) = meshes.col(k).transpose();
+    for (Eigen::Index k = 0; untwisted && k < shafts.cols(); ++k) c.row(row++) = shafts.col(k).transpose();
+    for (const auto& [mass, speed] : pinned) {
+        c.row(row).setZero();
+        c(row, mass) = 1;
+        value(row++) = speed;
+    }
+    Eigen::VectorXd root(n);
+    for (Eigen::Index j = 0; j < n; ++j) root(j) = m.root_inertia[static_cast<std::size_t>(j)];
+    // Minimise |√J (ω − wanted)|: the least-norm correction in √J-scaled speeds.
+    const Eigen::MatrixXd scaled = c * root.cwiseInverse().asDiagonal();
+    const Eigen::VectorXd correction = scaled.completeOrthogonalDecomposition().solve(value - c * wanted);
+    return wanted + root.cwiseInverse().cwiseProduct(correction);
+}
+
+// Actuators at rest at the inputs, auxiliary states as in steady running, contact states by the slip speeds.
+void initialise(const ModelData& m, double* block, const std::vector<double>& inputs, const std::vector<int>& locked) {
+    const Structure& s = m.structure;
+    const double* speeds = block + m.layout.speeds;
+    auto* contact = reinterpret_cast<unsigned char*>(block + m.layout.contact);
+    const auto input = [&](int index) { return index < 0 ? 0. : inputs[static_cast<std::size_t>(index)]; };
+    for (int k = 0; k < m.pairs; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        const detail::PairLaw& law = m.pair_laws[i];
+        contact[k] = detail::free_running;  // settled by its capacity in the first step
+        switch (law.source) {
+            case detail::LoadSource::release:
+            case detail::LoadSource::apply: block[law.actuator] = input(law.command); break;
+            case detail::LoadSource::hydraulic: {
+                double command = input(law.command), play = 0;
+                if (law.hydraulic->solenoid) {
+                    play = command;
+                    command = interpolate(law.hydraulic->solenoid->pressure_over_current, command);
+                }
+                HydraulicState state = hydraulic_rest(
+                    *law.hydraulic, law.friction.return_pressure, command,
+                    std::span<double>(block + law.actuator + 7, static_cast<std::size_t>(law.delay_slots)));
+                const double values[7] = {play,        state.head,       state.slewed, state.valve,
+                                          state.valve_rate, state.piston, state.chamber};
+                std::copy(values, values + 7, block + law.actuator);
+                break;
+            }
+            default: break;
+        }
+        if (law.temperature >= 0) block[law.temperature] = block[law.temperature + 1] = input(m.oil_temperature);
+    }
+    for (int k : locked) contact[k] = detail::locked;
+    for (int k = 0; k < m.meshes; ++k) {
+        const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
+        const double motion = detail::slip_of(mesh.motion(), speeds);
+        const bool stuck = mesh.lossy() && std::fabs(motion) <= at_rest;
+        contact[m.pairs + k] = stuck          ? static_cast<unsigned char>(detail::stuck)
+                               : mesh.lossy() ? detail::moving(motion, 1)
+                                              : static_cast<unsigned char>(detail::moves);
+    }
+    double* auxiliary = block + m.layout.auxiliary;
+    for (std::size_t t = 0; t < m.tyres.size(); ++t, ++auxiliary) {
+        const double rim = speeds[m.tyres[t].wheel] * m.description.tyres[t].radius, v = speeds[m.tyres[t].body];
+        const double rolling = std::fmax(std::fabs(rim), std::fabs(v));
+        *auxiliary = rolling > 0 ? (rim - v) / rolling : 0;
+    }
+    for (std::size_t e = 0; e < m.engines.size(); ++e, auxiliary += 2) {
+        const detail::EngineLaw& law = m.engines[e];
+        const Engine& engine = m.description.engines[e];
+        const double speed = speeds[law.mass];
+        const bool running = speed >= engine.stall_speed;
+        block[m.layout.engines + 3 * static_cast<int>(e)] =
+            static_cast<double>(static_cast<int>(running ? EngineMode::running : EngineMode::stalled));
+        if (!running) continue;
+        const EngineInput in{input(m.throttle), input(law.speed_request_enable) > 0.5, input(law.speed_request),
+                             input(law.torque_limit), input(law.fuel_cut) > 0.5};
+        const double full = full_load(engine, speed);
+        auxiliary[0] = torque_demand(engine, law.peak, in, speed, full, 1);
+        auxiliary[1] = full > 0 ? std::clamp(auxiliary[0] / full, 0., 1.) : 0;
+    }
+    for (std::size_t i = 0; i < m.sensors.size(); ++i) {
+        double* at = block + m.layout.sensors + 4 * static_cast<int>(i);
+        const SpeedSensor& sensor = m.description.sensors[i];
+        const double speed = speeds[m.sensors[i].mass];
+        at[1] = 1e9;
+        at[2] = at[3] = sensor.ideal || sensor.directional ? speed : std::fabs(speed);
+    }
+    double* energy = block + m.layout.energy;
+    energy[0] = energy[1] = 0;
+    std::vector<double> z(speeds, speeds + m.masses);
+    z.insert(z.end(), block + m.layout.twists, block + m.layout.twists + m.twists);
+    energy[2] = detail::stored_energy(m, z.data());
+}
+
+}  // namespace
+
+State::State(const Model& model) {
+    const ModelData& m = model.data();
+    block.assign(static_cast<std::size_t>(m.layout.size), 0.);
+    detail::write_integer(&block[1], m.masses);
+    detail::write_integer(&block[2], m.twists);
+    block[3] = m.options.step_size;
+
+    Eigen::VectorXd wanted(m.masses);
+    for (Eigen::Index j = 0; j < wanted.size(); ++j) {
+        wanted(j) = m.description.masses[static_cast<std::size_t>(j)].initial_speed;
+    }
+    std::vector<int> locked;
+    for (const Clutch& clutch : m.description.clutches) {
+        if (clutch.initially_locked) locked.push_back(m.structure.pair(clutch.name));
+    }
+    const Eigen::VectorXd speeds = compatible_speeds(m, wanted, locked, false, {});
+    for (int j = 0; j < m.masses; ++j) block[static_cast<std::size_t>(m.layout.speeds + j)] = speeds(j);
+    for (int e = 0; e < m.twists; ++e) {
+        block[static_cast<std::size_t>(m.layout.twists + e)] =
+            m.description.shafts[static_cast<std::size_t>(e)].initial_twist;
+    }
+    initialise(m, block.data(), Inputs(model).value, locked);
+}
+
+std::int64_t State::steps() const noexcept { return detail::read_integer(block.data()); }
+double State::time() const noexcept { return static_cast<double>(steps()) * block[3]; }
+
+std::span<const double> State::speeds() const noexcept {
+    return {block.data() + detail::StateLayout::header, static_cast<std::size_t>(detail::read_integer(&block[1]))};
+}
+std::span<const double> State::twists() const noexcept {
+    return {speeds().data() + speeds().size(), static_cast<std::size_t>(detail::read_integer(&block[2]))};
+}
+
+std::span<const std::byte> State::bytes() const noexcept { return std::as_bytes(std::span<const double>(block)); }
+
+bool State::restore(std::span<const std::byte> bytes) noexcept {
+    if (bytes.size() != block.size() * sizeof(double)) return false;
+    std::memcpy(block.data(), bytes.data(), bytes.size());
+    return true;
+}
+
+void start(const Model& model, State& state, const Start& start, const Inputs& inputs) {
+    const ModelData& m = model.data();
+    std::vector<int> locked;
+    for (const std::string& name : start.locked) {
+        const int pair = m.structure.pair(name);
+        if (pair < 0) throw ModelError("start", name, "locked", "is no clutch or brake of the model");
+        locked.push_back(pair);
+    }
+    std::vector<std::pair<int, double>> pinned;
+    for (const auto& [name, speed] : start.speeds) {
+        const int mass = m.structure.mass(name);
+        if (mass < 0) throw ModelError("start", name, "speeds", "is no mass of the model");
+        pinned.emplace_back(mass, speed);
+    }
+    const Eigen::VectorXd rest = Eigen::VectorXd::Zero(m.masses);
+    const Eigen::VectorXd speeds = compatible_speeds(m, rest, locked, true, pinned);
+    for (const auto& [mass, speed] : pinned) {
+        if (std::fabs(speeds(mass) - speed) > 1e-9 * (1 + std::fabs(speed))) {
+            throw ModelError("start", m.structure.mass_names[static_cast<std::size_t>(mass)], "speeds",
+                             "contradicts the other speeds through gears and locked devices");
+        }
+    }
+    std::fill(state.block.begin() + detail::StateLayout::header, state.block.end(), 0.);
+    detail::write_integer(&state.block[0], 0);
+    for (int j = 0; j < m.masses; ++j) state.block[static_cast<std::size_t>(m.layout.speeds + j)] = speeds(j);
+    initialise(m, state.block.data(), inputs.value, locked);
+}
+
+}  // namespace shiftrig::plant

@@ -1,0 +1,36 @@
+// Where things are in the State block, in doubles. The block is plain numbers, so its bytes are a snapshot.
+//
+//   steps (an int64), masses, twists (int64 each), h          header, 4 slots
+//   ω                     speeds in description order         [rad/s] or [m/s]
+//   φ                     twists of the shafts                [rad]
+//   distance              of translating masses               [m]
+//   auxiliary             κ per tyre [1]; torque [Nm] and boost [1] per engine
+//   contact               one byte per pair and mesh (contact.h)
+//   actuators             per clutch as its actuation needs
+//   heat                  per friction pair, since start      [J]
+//   temperature           surface, bulk per heated clutch     [°C]
+//   energy                input, dissipated, stored at start  [J]
+//   engine                mode, cranking time [s], last start input
+//   sensor                4 per sensor (laws/sensor.h)
+//   tie-up                1 while a torque split is not unique
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+namespace shiftrig::plant::detail {
+
+struct StateLayout {
+    static constexpr int header = 4;
+    int speeds = 0, twists = 0, distances = 0, auxiliary = 0, contact = 0, actuators = 0, heat = 0,
+        temperatures = 0, energy = 0, engines = 0, sensors = 0, tie_up = 0, size = 0;
+};
+
+inline std::int64_t read_integer(const double* slot) noexcept {
+    std::int64_t value;
+    std::memcpy(&value, slot, sizeof value);
+    return value;
+}
+inline void write_integer(double* slot, std::int64_t value) noexcept { std::memcpy(slot, &value, sizeof value); }
+
+}  // namespace shiftrig::plant::detail

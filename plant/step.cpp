@@ -1,0 +1,92 @@
+// One step of the plant. [Algin] Fig. 10, with the state changes of eq. (12), (13) found inside the step.
+#include <algorithm>
+
+#include "plant/etd3.h"
+#include "plant/finish.h"
+#include "plant/forces.h"
+#include "plant/ledger.h"
+#include "plant/transitions.h"
+
+namespace shiftrig::plant {
+namespace {
+
+using namespace detail;
+
+constexpr double instant = 1e-10;  // parts of a step shorter than this are none
+
+// Where the part beginning at `from` must end at the latest: laws jump there.
+double next_split(const Work& w, double from) SHIFTRIG_REALTIME {
+    double split = 1;
+    const auto consider = [&](double fraction) {
+        if (fraction > from + 1e-9 && fraction < split - 1e-9) split = fraction;
+    };
+    for (const PairLoad& load : w.scratch.loads) consider(load.hydraulic.filled_from);
+    const std::vector<double>& times = w.model.breakpoints;
+    const auto first = std::upper_bound(times.begin(), times.end(), w.start + from * w.h);
+    for (auto time = first; time != times.end() && *time < w.start + w.h; ++time) consider((*time - w.start) / w.h);
+    return split;
+}
+
+}  // namespace
+
+void step(const Model& model, Operators& operators, State& state, const Inputs& inputs, Outputs& outputs,
+          Scratch& scratch) SHIFTRIG_REALTIME {
+    const ModelData& m = model.data();
+    ScratchData& s = scratch.data();
+    Work w = begin_step(m, operators.data(), state, outputs, s);
+    const bool localise = m.description.transition == Transition::localised;
+
+    // Commands as they act; valves, pistons and pedals over the whole step.
+    latch_inputs(w, inputs);
+    advance_actuation(w);
+
+    // Torque capacities, external torques, internal torques, power-flow directions, internal torques with
+    // losses ([Algin] eq. (11), (14), (15), (16)–(25)); what cannot hold at t0+ opens (eq. (12)).
+    Mode* mode = &settle(w, s.begin);
+
+    for (double done = 0; done < 1;) {
+        // Advance over what is left, up to the next jump of a law.
+        const double until = next_split(w, done);
+        advance(w, *mode, until);
+
+        // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
+        Crossing first = first_crossing(w, *mode, s.begin, s.end);
+        const bool inside = first.device >= 0 && localise && outputs.certificate.events < m.description.maximum_events;
+        double reached = until;
+        if (inside && first.theta * (until - done) < instant) {
+            reached = done;
+        } else if (inside && first.theta < 1 - instant) {
+            reached = done + first.theta * (until - done);
+            advance(w, *mode, reached);
+        }
+
+        // Energy ledger of the accepted part.
+        if (reached > done) {
+            book(w, *mode);
+            accept(w);
+            done = reached;
+        }
+
+        // The new state acts from here on; where events are used up, or by choice, from the next step on.
+        if (inside) {
+            change_state(w, first.device, s.begin);
+            ++outputs.certificate.events;
+        } else if (first.device >= 0) {
+            change_all(w, *mode, s.begin);
+            outputs.certificate.fall_backs += localise;
+        }
+        if (done < 1) mode = &settle(w, s.begin);
+    }
+    finish_step(w, *mode);
+}
+
+void observe(const Model& model, Operators& operators, const State& state, const Inputs& inputs, Outputs& outputs,
+             Scratch& scratch) SHIFTRIG_REALTIME {
+    Work w = begin_look(model.data(), operators.data(), state, outputs, scratch.data());
+    latch_inputs(w, inputs);
+    hold_actuation(w);
+    const Mode& mode = settle(w, w.scratch.begin);
+    finish_look(w, mode);
+}
+
+}  // namespace shiftrig::plant

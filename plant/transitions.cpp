@@ -1,0 +1,392 @@
+#include "plant/transitions.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plant/dense.h"
+
+namespace shiftrig::plant::detail {
+namespace {
+
+constexpr double at_rest = 1e-9;      // a pair that engages at less slip than this closes at once [rad/s]
+constexpr double overload = 1 + 1e-9; // torque over capacity that opens a closed pair
+
+const std::array<Link, 2>& pair_links(const Work& w, int pair) {
+    return w.model.structure.pairs[static_cast<std::size_t>(pair)].links;
+}
+const Mesh& mesh_of(const Work& w, int mesh) { return w.model.structure.meshes[static_cast<std::size_t>(mesh)]; }
+
+// The slip that a contact byte is about.
+double device_slip(const Work& w, int device, const double* speeds) {
+    return device < w.model.pairs ? slip_of(pair_links(w, device), speeds)
+                                  : slip_of(mesh_of(w, device - w.model.pairs).motion(), speeds);
+}
+
+// Sum of magnitudes behind a slip: what its rounding errors are relative to.
+double slip_scale(const Work& w, int device, const double* speeds) {
+    const std::array<Link, 2> links =
+        device < w.model.pairs ? pair_links(w, device) : mesh_of(w, device - w.model.pairs).motion();
+    double scale = 1;
+    for (const Link& link : links) {
+        if (link.mass >= 0) scale += std::fabs(link.factor * speeds[link.mass]);
+    }
+    return scale;
+}
+
+double torque_scale(const Work& w, const Sample& s) {
+    double scale = 0;
+    for (int k = 0; k < w.model.torques; ++k) scale = std::max(scale, std::fabs(s.torque[k]));
+    for (int k = 0; k < w.model.forces; ++k) scale = std::max(scale, std::fabs(s.f[k]));
+    return scale;
+}
+
+// Torque at which the two loss lines of a mesh cross: below it the second link drives.
+double loss_kink(const Mesh& mesh, double s) {
+    const double slope = mesh.forward_efficiency - 1 / mesh.backward_efficiency;
+    const double tau = slope < 0 ? (mesh.forward_bearing - mesh.backward_bearing) / slope : mesh.forward_bearing / 2;
+    return s * tau;
+}
+
+// Lossy meshes that others hold at rest do not move: they carry torque without loss.
+bool rest_bound_meshes(const Work& w, const Mode& mode, unsigned char* contact) {
+    bool changed = false;
+    for (int k = 0; k < w.model.meshes; ++k) {
+        unsigned char& state = contact[w.model.pairs + k];
+        if (state != stuck && mode.bound[w.model.pairs + k] && mesh_of(w, k).lossy()) {
+            state = stuck;
+            changed = true;
+        }
+    }
+    return changed;
+}
+
+// Loss directions that agree with the torques they lead to ([Algin] eq. (16)–(25), but decided by the lossy
+// torques): start from the present ones and flip the worst offender until there is none.
+Mode& find_directions(Work& w, unsigned char* contact, Sample& s) {
+    const ModelData& m = w.model;
+    const int most = 2 * m.meshes + 2;
+    for (int flips = 0;; ++flips) {
+        Mode& mode = find_mode(m, w.operators, contact, w.scratch);
+        ++w.outputs.certificate.mode_lookups;
+        if (rest_bound_meshes(w, mode, contact)) {
+            contact_forces(w, contact, s);
+            continue;
+        }
+        internal_torques(w, mode, s);
+        int worst = -1;
+        double largest = 1e-9 * torque_scale(w, s);
+        for (int k = 0; k < m.meshes; ++k) {
+            const unsigned char state = contact[m.pairs + k];
+            const Mesh& mesh = mesh_of(w, k);
+            if (state == stuck || !mesh.lossy()) continue;
+            const double sign = motion_sign(state);
+            const double torque = s.torque[m.pairs + k] - loss_kink(mesh, sign);
+            const int x = torque * sign < 0 ? -1 : 1;
+            if (x != loss_exponent(state) && std::fabs(torque) > largest) {
+                largest = std::fabs(torque);
+                worst = k;
+            }
+        }
+        if (worst < 0) return mode;
+        if (flips >= most) {
+            w.outputs.certificate.flags |= 2;
+            return mode;
+        }
+        contact[m.pairs + worst] ^= driven;
+        contact_forces(w, contact, s);
+    }
+}
+
+// Pairs by their capacity: none is free, some engages. [Algin]: a change of λ by pressure.
+void engage_and_release(Work& w, Sample& s) {
+    const ModelData& m = w.model;
+    bool changed = false;
+    for (int k = 0; k < m.pairs; ++k) {
+        const bool capable = s.sliding[k] > 0 || s.holding[k] > 0;
+        const double slip = slip_of(pair_links(w, k), s.z);
+        if (!capable && w.contact[k] != free_running) {
+            log_event(w, EventKind::release, k, s.at.time, s.torque[k], 0, slip);
+            w.contact[k] = free_running;
+            changed = true;
+        } else if (capable && w.contact[k] == free_running) {
+            if (std::fabs(slip) > at_rest) {
+                log_event(w, EventKind::engage, k, s.at.time, 0, s.sliding[k], slip);
+                w.contact[k] = slipping(slip);
+            } else {
+                change_state(w, k, s);
+            }
+            changed = true;
+        }
+    }
+    if (changed) contact_forces(w, w.contact, s);
+}
+
+// The locked pair that is loaded furthest beyond its static capacity.
+int most_overloaded(const Work& w, const Sample& s) {
+    int worst = -1;
+    double highest = overload;
+    for (int k = 0; k < w.model.pairs; ++k) {
+        if (w.contact[k] != locked) continue;
+        const double use = std::fabs(s.torque[k]) / s.holding[k];
+        if (use > highest) {
+            highest = use;
+            worst = k;
+        }
+    }
+    return worst;
+}
+
+void open(Work& w, int pair, Sample& s) {
+    log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], s.holding[pair], 0);
+    w.contact[pair] = slipping(s.torque[pair]);
+    contact_forces(w, w.contact, s);
+}
+
+// ---- stuck meshes -----------------------------------------------------------------------------------
+
+// Direction in which a device takes part in a motion, after everything that locked pairs and meshes
+// exclude: column of length √(1/reduced inertia), in J^(−1/2) scaling.
+template <typename Links>
+double reduced_motion(const Work& w, const Mode& mode, const Links& links, double* column) {
+    const ModelData& m = w.model;
+    std::fill(column, column + m.masses, 0.);
+    double length = 0;
+    for (const Link& link : links) {
+        if (link.mass < 0) continue;
+        column[link.mass] += link.factor / m.root_inertia[static_cast<std::size_t>(link.mass)];
+    }
+    length = std::sqrt(dot(column, column, m.masses));
+    for (int pass = 0; pass < 2; ++pass) {
+        for (int k = 0; k < mode.base_rank; ++k) {
+            const double* q = mode.basis + k * m.masses;
+            add_scaled(column, -dot(q, column, m.masses), q, m.masses);
+        }
+    }
+    const double rest = std::sqrt(dot(column, column, m.masses));
+    return rest < 1e-9 * length ? 0 : rest;
+}
+
+// Everything at rest that moves if mesh `leader` moves is one family: it is let go together, each member
+// with the sign that the motion gives it. Released if, going one way with its own consistent losses, the
+// family accelerates that way. Returns true if it went.
+bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
+    const ModelData& m = w.model;
+    ScratchData& scratch = w.scratch;
+    double* lead = scratch.vector_a.data();
+    double* member = scratch.vector_b.data();
+    const double mobility = reduced_motion(w, mode, mesh_of(w, leader).motion(), lead);
+    if (mobility == 0) return false;
+    // +1, −1: in the family, turning with or against the leader; 0: not in it.
+    signed char* part = scratch.family.data();
+    const auto relation = [&](const std::array<Link, 2>& links) -> signed char {
+        const double size = reduced_motion(w, mode, links, member);
+        if (size == 0) return 0;
+        const double cosine = dot(lead, member, m.masses) / (mobility * size);
+        return static_cast<signed char>(std::fabs(cosine) < 1 - 1e-9 ? 0 : cosine < 0 ? -1 : 1);
+    };
+    for (int k = 0; k < m.pairs; ++k) {
+        part[k] = slips(w.contact[k]) && mode.bound[k] ? relation(pair_links(w, k)) : static_cast<signed char>(0);
+    }
+    for (int k = 0; k < m.meshes; ++k) {
+        const bool candidate = mesh_of(w, k).lossy() && w.contact[m.pairs + k] == stuck;
+        part[m.pairs + k] = candidate ? relation(mesh_of(w, k).motion()) : static_cast<signed char>(0);
+    }
+
+    const double threshold = 1e-10 * torque_scale(w, s) * mobility * mobility;
+    const double needed = s.torque[m.pairs + m.meshes + leader];
+    unsigned char* trial = scratch.trial.data();
+    std::copy(s.torque, s.torque + m.torques, scratch.torque_copy.data());
+    for (const double direction : {1., -1.}) {
+        std::copy(w.contact, w.contact + m.contact_bytes, trial);
+        for (int k = 0; k < m.contact_bytes; ++k) {
+            if (part[k] == 0) continue;
+            const double sign = direction * part[k];
+            trial[k] = k < m.pairs ? slipping(sign) : moving(sign, scratch.torque_copy[static_cast<std::size_t>(k)] * sign < 0 ? -1 : 1);
+        }
+        contact_forces(w, trial, s);
+        const Mode& moving_mode = find_directions(w, trial, s);
+        if (trial[m.pairs + leader] == stuck) continue;
+        sample_rate(w, moving_mode, s);
+        const double acceleration = slip_of(mesh_of(w, leader).motion(), s.rate);
+        if (acceleration * direction > threshold) {
+            for (int k = 0; k < m.meshes; ++k) {
+                if (part[m.pairs + k] == 0) continue;
+                log_event(w, EventKind::mesh_releases, m.pairs + k, s.at.time, s.torque[m.pairs + k], needed, 0);
+            }
+            std::copy(trial, trial + m.contact_bytes, w.contact);
+            return true;
+        }
+    }
+    contact_forces(w, w.contact, s);
+    std::copy(scratch.torque_copy.begin(), scratch.torque_copy.end(), s.torque);
+    return false;
+}
+
+bool release_stuck_meshes(Work& w, const Mode& mode, Sample& s) {
+    const ModelData& m = w.model;
+    for (int r = 0; r < mode.row_count; ++r) {
+        const int leader = mode.rows[r] - m.pairs - m.meshes;
+        if (leader >= 0 && try_release(w, mode, leader, s)) return true;
+    }
+    return false;
+}
+
+// ---- crossings --------------------------------------------------------------------------------------
+
+// Root in [0, 1] of the parabola through g(0), its slope there (per unit length) and g(1) < 0.
+double parabola_root(double g0, double slope, double g1) {
+    if (g0 <= 0) {
+        if (slope <= 0) return 0;
+        g0 = 0;
+    }
+    const double a = g1 - g0 - slope;
+    const double root = std::sqrt(std::max(0., slope * slope - 4 * a * g0));
+    const double q = -0.5 * (slope + (slope < 0 ? -root : root));
+    double theta = g0 == 0 ? (a != 0 ? -slope / a : 1) : q > 0 ? g0 / q : a != 0 ? q / a : 1;
+    if (!(theta >= 0 && theta <= 1)) theta = a != 0 ? q / a : 1;
+    return std::clamp(theta, 0., 1.);
+}
+
+// Does the state of this device fail to hold at the end sample? Bound slips are zero by others' doing.
+bool violated(const Work& w, const Mode& mode, int device, const Sample& end) {
+    const ModelData& m = w.model;
+    const unsigned char state = w.contact[device];
+    if (device < m.pairs) {
+        if (state == locked) return std::fabs(end.torque[device]) > overload * end.holding[device];
+        if (state == free_running || mode.bound[device]) return false;
+        return slip_sign(state) * device_slip(w, device, end.z) < -1e-13 * slip_scale(w, device, end.z);
+    }
+    if (state == stuck || mode.bound[device] || !mesh_of(w, device - m.pairs).lossy()) return false;
+    return motion_sign(state) * device_slip(w, device, end.z) < -1e-13 * slip_scale(w, device, end.z);
+}
+
+void close(Work& w, int device, Sample& s) {
+    const ModelData& m = w.model;
+    Mode& before = find_mode(m, w.operators, w.contact, w.scratch);
+    unsigned char* was_bound = w.scratch.changed.data();
+    std::copy(before.bound, before.bound + m.contact_bytes, was_bound);
+    const auto capacity = [&](int k) { return k < m.pairs ? s.holding[k] : 0.; };
+    const auto set = [&](int k) {
+        w.contact[k] = k < m.pairs ? static_cast<unsigned char>(locked) : static_cast<unsigned char>(stuck);
+        log_event(w, k < m.pairs ? EventKind::lock : EventKind::mesh_sticks, k, s.at.time, s.torque[k], capacity(k),
+                  device_slip(w, k, s.z));
+    };
+    set(device);
+    const Mode& mode = find_mode(m, w.operators, w.contact, w.scratch);
+    const double lost = join(w, mode, s.z);
+    w.scratch.dissipated += lost;
+    if (device < m.pairs) w.scratch.heat[static_cast<std::size_t>(device)] += lost;
+    // What came to rest with it: the same motion, hence the same instant.
+    for (int k = 0; k < m.pairs; ++k) {
+        if (slips(w.contact[k]) && mode.bound[k] && !was_bound[k]) set(k);
+    }
+    for (int k = m.pairs; k < m.contact_bytes; ++k) {
+        if (w.contact[k] != stuck && mode.bound[k] && mesh_of(w, k - m.pairs).lossy()) set(k);
+    }
+}
+
+}  // namespace
+
+void log_event(Work& w, EventKind kind, int device, double time, double torque, double capacity,
+               double slip) SHIFTRIG_REALTIME {
+    const int index = w.outputs.event_count++;
+    if (index >= Outputs::event_capacity) return;
+    w.outputs.events[static_cast<std::size_t>(index)] = {time, kind, static_cast<std::int16_t>(device), torque,
+                                                         capacity, slip};
+}
+
+void sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    m.kernel.multiply(mode.rates, m.states_padded / panel_rows, m.columns, s.z, nullptr, s.rate);
+}
+
+double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    double* momentum = w.scratch.vector_a.data();
+    double* joined = w.scratch.vector_b.data();
+    double before = 0, after = 0;
+    for (int j = 0; j < m.masses; ++j) {
+        momentum[j] = m.structure.inertia[static_cast<std::size_t>(j)] * speeds[j];
+        before += 0.5 * momentum[j] * speeds[j];
+    }
+    m.kernel.multiply(mode.mobility, padded(m.masses) / panel_rows, m.masses, momentum, nullptr, joined);
+    for (int j = 0; j < m.masses; ++j) {
+        speeds[j] = joined[j];
+        after += 0.5 * m.structure.inertia[static_cast<std::size_t>(j)] * speeds[j] * speeds[j];
+    }
+    return before - after;
+}
+
+Mode& settle(Work& w, Sample& s) SHIFTRIG_REALTIME {
+    evaluate_forces(w, w.contact, s);
+    engage_and_release(w, s);
+    for (int passes = 0;; ++passes) {
+        Mode& mode = find_directions(w, w.contact, s);
+        if (passes > 2 * w.model.contact_bytes + 2) return mode;
+        const int overloaded = most_overloaded(w, s);
+        if (overloaded >= 0) {
+            open(w, overloaded, s);
+            continue;
+        }
+        if (release_stuck_meshes(w, mode, s)) continue;
+        return mode;
+    }
+}
+
+Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, const Sample& end) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    Crossing first;
+    bool rates_known = false;
+    for (int k = 0; k < m.contact_bytes; ++k) {
+        if (!violated(w, mode, k, end)) continue;
+        double theta;
+        if (k < m.pairs && w.contact[k] == locked) {
+            const double g0 = begin.holding[k] - std::fabs(begin.torque[k]);
+            const double g1 = end.holding[k] - std::fabs(end.torque[k]);
+            theta = g0 <= 0 ? 0 : g0 / (g0 - g1);
+        } else {
+            if (!rates_known) sample_rate(w, mode, begin);
+            rates_known = true;
+            const double sign = k < m.pairs ? slip_sign(w.contact[k]) : motion_sign(w.contact[k]);
+            const double length = end.at.time - begin.at.time;
+            theta = parabola_root(sign * device_slip(w, k, begin.z), sign * device_slip(w, k, begin.rate) * length,
+                                  sign * device_slip(w, k, end.z));
+        }
+        if (first.device < 0 || theta < first.theta) first = {k, theta};
+    }
+    return first;
+}
+
+void change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
+    if (device < w.model.pairs && w.contact[device] == locked) {
+        open(w, device, s);
+    } else {
+        close(w, device, s);
+    }
+}
+
+void change_all(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    unsigned char* list = w.scratch.violations.data();
+    for (int k = 0; k < w.model.contact_bytes; ++k) list[k] = violated(w, mode, k, s);
+    for (int k = 0; k < w.model.contact_bytes; ++k) {
+        const bool closed = k < w.model.pairs ? w.contact[k] == locked : w.contact[k] == stuck;
+        if (!list[k]) continue;
+        if (k < w.model.pairs && closed) {
+            open(w, k, s);
+        } else if (!closed) {
+            close(w, k, s);
+        }
+    }
+    // A join with residual slip may have turned others round.
+    for (int k = 0; k < w.model.contact_bytes; ++k) {
+        const double slip = device_slip(w, k, s.z);
+        if (std::fabs(slip) <= at_rest) continue;
+        if (k < w.model.pairs) {
+            if (slips(w.contact[k])) w.contact[k] = slipping(slip);
+        } else if (w.contact[k] != stuck) {
+            w.contact[k] = moving(slip, loss_exponent(w.contact[k]));
+        }
+    }
+}
+
+}  // namespace shiftrig::plant::detail

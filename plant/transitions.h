@@ -1,0 +1,39 @@
+// Changes of contact state: which device changes when, and what else follows from it. Internal to plant/.
+#pragma once
+
+#include "plant/forces.h"
+
+namespace shiftrig::plant::detail {
+
+// Brings contact states and loss directions into agreement with the sample's instant: engages and releases
+// pairs by their capacity, chooses every mesh's x by the lossy torques, opens what is overloaded ([Algin]
+// eq. (12)), lets stuck meshes go. Devices are only opened here, never closed, so it ends. Leaves forces
+// and internal torques of the settled mode in the sample.
+Mode& settle(Work& work, Sample& sample) SHIFTRIG_REALTIME;
+
+struct Crossing {
+    int device = -1;   // contact byte: pair or pairs + mesh; −1: nobody changes
+    double theta = 1;  // where between begin and end, 0…1
+};
+
+// The first device whose state does not hold until the end of the part just computed: a slip speed that
+// changes sign ([Algin] eq. (13)), a torque above the static capacity (eq. (12)).
+Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, const Sample& end) SHIFTRIG_REALTIME;
+
+// Changes the state of one device at the sample, and with it of all that its closing brings to rest.
+void change_state(Work& work, int device, Sample& sample) SHIFTRIG_REALTIME;
+
+// The article's next-step rule: every device whose state did not hold changes at the end of the step.
+void change_all(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+
+// ω⁺ = B J ω: the impulse through the active rigid set of `mode` that makes its speeds agree. Returns the
+// kinetic energy lost [J].
+double join(Work& work, const Mode& mode, double* speeds) SHIFTRIG_REALTIME;
+
+// ż = L z + S̃ f of the sample.
+void sample_rate(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+
+void log_event(Work& work, EventKind kind, int device, double time, double torque, double capacity,
+               double slip) SHIFTRIG_REALTIME;
+
+}  // namespace shiftrig::plant::detail
