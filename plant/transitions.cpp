@@ -336,14 +336,16 @@ Mode& settle(Work& w, Sample& s) SHIFTRIG_REALTIME {
 Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, const Sample& end) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     Crossing first;
-    bool rates_known = false;
+    bool rates_known = false, middle_known = false;
     for (int k = 0; k < m.contact_bytes; ++k) {
         if (!violated(w, mode, k, end)) continue;
         double theta;
         if (k < m.pairs && w.contact[k] == locked) {
-            const double g0 = begin.holding[k] - std::fabs(begin.torque[k]);
-            const double g1 = end.holding[k] - std::fabs(end.torque[k]);
-            theta = g0 <= 0 ? 0 : g0 / (g0 - g1);
+            if (!middle_known) internal_torques(w, mode, w.scratch.half);
+            middle_known = true;
+            const auto margin = [k](const Sample& s) { return s.holding[k] - std::fabs(s.torque[k]); };
+            const double g0 = margin(begin), gm = margin(w.scratch.half), g1 = margin(end);
+            theta = g0 <= 0 ? 0 : parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
         } else {
             if (!rates_known) sample_rate(w, mode, begin);
             rates_known = true;

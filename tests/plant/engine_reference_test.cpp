@@ -1,0 +1,134 @@
+// Against curves made elsewhere (tests/data, provenance in tests/data/README.md). The bounds are three times what a
+// prototype of the same method reached, where the reference's own tolerance is not larger.
+#include "rig.h"
+
+namespace shiftrig::plant {
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+
+Description coupled_clutches() {
+    Description d;
+    d.name = "CoupledClutches";
+    d.masses = {mass("J1", 1, 10), mass("J2", 1), mass("J3", 1), mass("J4", 1)};
+    // cos(0.4 π t) on [0, 1.25 s): a sine of 0.2 Hz a quarter turn early.
+    d.clutches = {clutch("clutch1", "J1", "J2", 10, 1.1, ActuationDirect{sine(1, 0.2, -1e300, 1.25, -1.25), 0}),
+                  clutch("clutch2", "J2", "J3", 10, 1.1, ActuationDirect{constant(1, 0.4), 0}),
+                  clutch("clutch3", "J3", "J4", 10, 1.1, ActuationDirect{constant(1, 0.9), 0})};
+    d.sources = {source("J1", sine(10, 5))};
+    return d;
+}
+
+Description friction() {
+    Description d;
+    d.name = "Friction";
+    d.masses = {mass("J3", 1, 100), mass("J2", 0.05, 90), mass("J1", 1, 90)};
+    d.clutches = {clutch("clutch", "J3", "J2", 80),
+                  clutch("brake", "J1", "", 800, 1, ActuationDirect{constant(1, 0.5), 0})};
+    d.shafts = {{"spring", "J2", "J1", 160, 1, 0}};
+    d.sources = {source("J3", sine(200, 100 / (2 * pi), -1e300, 0.5))};
+    return d;
+}
+
+Description lossy_gear() {
+    Description d;
+    d.name = "LossyGearDemo1";
+    d.masses = {mass("J1", 1), mass("J2", 1.5)};
+    Gear gear;
+    gear.name = "gear";
+    gear.a = "J1";
+    gear.b = "J2";
+    gear.ratio = 2;
+    gear.efficiency = 0.5;
+    d.gears = {gear};
+    Waveform load;
+    load.pieces.push_back({});
+    load.pieces[0].from = 0;
+    load.pieces[0].offset = -10;
+    load.pieces[0].slope = 2.5;
+    d.sources = {source("J1", sine(10, 1)), source("J2", load)};
+    return d;
+}
+
+// Worst difference of a signal from a reference column over the run, on the grid both share.
+struct Comparison {
+    std::string signal, column;
+    double sign = 1;
+    double worst = 0;
+};
+
+void compare(Rig& rig, const std::string& file, double h, std::vector<Comparison>& comparisons) {
+    const auto reference = read_reference(file);
+    const auto every = static_cast<std::size_t>(std::lround(h / 1e-3));
+    const std::size_t rows = reference.at("time").size();
+    ASSERT_GT(rows, 100u);
+    for (std::size_t row = every; row < rows; row += every) {
+        rig.step();
+        for (Comparison& c : comparisons) {
+            const double error = std::fabs(c.sign * rig.out(c.signal) - reference.at(c.column)[row]);
+            c.worst = std::max(c.worst, error);
+        }
+    }
+}
+
+class StepSize : public ::testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(OneAndTwoMilliseconds, StepSize, ::testing::Values(1e-3, 2e-3));
+
+TEST_P(StepSize, CoupledClutchesFollowTheReference) {
+    Rig rig(coupled_clutches(), {GetParam(), KernelKind::automatic});
+    std::vector<Comparison> c = {{"mass.J1.speed", "J1.w"},
+                                 {"clutch.clutch1.slip", "clutch1.w_rel", -1},
+                                 {"clutch.clutch2.slip", "clutch2.w_rel", -1},
+                                 {"clutch.clutch3.slip", "clutch3.w_rel", -1}};
+    compare(rig, "CoupledClutches.csv", GetParam(), c);
+    EXPECT_LT(c[0].worst, 3 * 6.6e-5);
+    EXPECT_LT(c[1].worst, 3 * 6.6e-5);
+    EXPECT_LT(c[2].worst, 3 * 1.5e-7);
+    EXPECT_LT(c[3].worst, 3 * 3.1e-5);
+    EXPECT_EQ(rig.fall_backs, 0);
+    // Momentum: Σω(1.5 s) = 10 + 2/π, whatever the clutches do.
+    double sum = 0;
+    for (double speed : rig.state.speeds()) sum += speed;
+    EXPECT_NEAR(sum, 10 + 2 / pi, 2e3 * std::pow(GetParam(), 4));  // quadrature of the sine, order 4
+    const auto lock1 = rig.times(EventKind::lock, "clutch1"), lock2 = rig.times(EventKind::lock, "clutch2"),
+               lock3 = rig.times(EventKind::lock, "clutch3"), open1 = rig.times(EventKind::break_away, "clutch1");
+    ASSERT_EQ(lock1.size(), 2u);
+    ASSERT_EQ(lock2.size(), 1u);
+    ASSERT_EQ(lock3.size(), 1u);
+    ASSERT_EQ(open1.size(), 2u);
+    EXPECT_NEAR(lock1[0], 0.7916583, 1.3e-5);
+    EXPECT_NEAR(open1[0], 0.8311085, 1.3e-5);
+    EXPECT_NEAR(lock1[1], 0.9068491, 1.3e-5);
+    EXPECT_NEAR(open1[1], 1.0002959, 1.3e-5);
+    EXPECT_NEAR(lock2[0], 0.7096215, 1.3e-5);
+    EXPECT_NEAR(lock3[0], 1.1439696, 1.3e-5);
+}
+
+TEST_P(StepSize, FrictionFollowsTheReference) {
+    Rig rig(friction(), {GetParam(), KernelKind::automatic});
+    std::vector<Comparison> c = {{"mass.J3.speed", "inertia3.w"},
+                                 {"clutch.clutch.slip", "clutch.w_rel", -1},
+                                 {"shaft.spring.twist", "spring.phi_rel", -1}};
+    compare(rig, "Friction.csv", GetParam(), c);
+    EXPECT_LT(c[0].worst, 4e-4);  // the reference's own agreement
+    EXPECT_LT(c[1].worst, 4e-4);
+    EXPECT_LT(c[2].worst, 3 * 1e-5);
+    EXPECT_EQ(rig.fall_backs, 0);
+}
+
+TEST(Reference, LossyGearSticksAndReleasesAsTheReference) {
+    Rig rig(lossy_gear());
+    std::vector<Comparison> c = {{"mass.J2.speed", "Inertia2.w"}};
+    compare(rig, "LossyGearDemo1.csv", 1e-3, c);
+    EXPECT_LT(c[0].worst, 3 * 2.7e-6);
+    const auto sticks = rig.times(EventKind::mesh_sticks, "gear"), moves = rig.times(EventKind::mesh_releases, "gear");
+    ASSERT_EQ(sticks.size(), 2u);
+    ASSERT_EQ(moves.size(), 3u);  // at the start as well
+    EXPECT_NEAR(sticks[0], 0.0804771, 4.5e-6);
+    EXPECT_NEAR(sticks[1], 0.3713427, 4.5e-6);
+    EXPECT_NEAR(moves[1], 0.1995199, 1e-3);
+    EXPECT_NEAR(moves[2], 0.4645395, 1e-3);
+}
+
+}  // namespace
+}  // namespace shiftrig::plant
