@@ -46,6 +46,8 @@ class Responses {
     Response build(const Mode& mode) const;
     const System& system_;
     std::map<std::vector<int>, Response> cache_;
+    Mode last_mode_;
+    const Response* last_ = nullptr;
 };
 
 }  // namespace shiftrig::reference
