@@ -67,7 +67,8 @@ Deviation deviation(const Table& truth, const Table& other, const ComparisonOpti
         const double time = static_cast<double>(k) * 1e-3;
         bool settled = truth.unique[k] && k > 0;
         for (const auto* changes : {&truth.change_times, &other.change_times})
-            for (const double change : *changes) settled = settled && std::abs(change - time) > options.event_clearance;
+            for (const double change : *changes)
+                settled = settled && std::abs(change - time) > options.event_clearance;
         for (std::size_t i = 0; i < signals; ++i) {
             const bool smooth = static_cast<int>(i) < truth.smooth;
             if (!smooth && !settled) continue;
@@ -107,7 +108,8 @@ double violation_of(const Description& d, const Model& model, const Outputs& out
     double worst = 0;
     for (const auto& g : d.gears) worst = std::max(worst, std::abs(speed(g.a) - g.ratio * speed(g.b)));
     for (const auto& r : d.planetaries)
-        worst = std::max(worst, std::abs(speed(r.sun) - r.ratio * speed(r.ring) - (1 - r.ratio) * speed(r.carrier)));
+        worst = std::max(worst,
+                         std::abs(speed(r.sun) - r.ratio * speed(r.ring) - (1 - r.ratio) * speed(r.carrier)));
     for (const auto& c : d.clutches)
         if (outputs.value[static_cast<std::size_t>(model.output("clutch." + c.name + ".state"))] == 0)
             worst = std::max(worst, std::abs(speed(c.a) - (c.b.empty() ? 0.0 : speed(c.b))));
@@ -123,7 +125,9 @@ PlantRun run_plant(const Description& d, const Table& layout, std::uint64_t seed
     Outputs outputs(model), twin_outputs(model);
     std::vector<std::size_t> column;
     for (const auto& name : layout.names) column.push_back(static_cast<std::size_t>(model.output(name)));
-    const auto output = [&](const char* name) { return outputs.value[static_cast<std::size_t>(model.output(name))]; };
+    const auto output = [&](const char* name) {
+        return outputs.value[static_cast<std::size_t>(model.output(name))];
+    };
 
     PlantRun run;
     run.table.names = layout.names;
@@ -151,7 +155,9 @@ PlantRun run_plant(const Description& d, const Table& layout, std::uint64_t seed
         record();
         for (const double v : run.table.rows.back()) finite = finite && std::isfinite(v);
         for (const auto& m : d.masses)
-            fastest = std::max(fastest, std::abs(outputs.value[static_cast<std::size_t>(model.output("mass." + m.name + ".speed"))]));
+            fastest = std::max(
+                fastest,
+                std::abs(outputs.value[static_cast<std::size_t>(model.output("mass." + m.name + ".speed"))]));
         violation = std::max(violation, violation_of(d, model, outputs));
         run.fall_backs += outputs.certificate.fall_backs;
         run.events += outputs.certificate.events;
@@ -168,9 +174,11 @@ PlantRun run_plant(const Description& d, const Table& layout, std::uint64_t seed
     run.worst_defect /= std::max(moved, 1e-9);
     if (!finite) run.broken.push_back("a signal is not finite");
     if (!same) run.broken.push_back("a run with forgotten operators differs in its bits");
-    if (violation > 1e-10 * fastest) run.broken.push_back(text("constraint violated by %.3g rad/s", violation));
+    if (violation > 1e-10 * fastest)
+        run.broken.push_back(text("constraint violated by %.3g rad/s", violation));
     const double defect = run.stored - stored_at_start - run.input + run.dissipated;
-    if (!(std::abs(defect) <= 1e-4 * moved + 1e-9)) run.broken.push_back(text("ledger open by %.3g of %.3g J", defect, moved));
+    if (!(std::abs(defect) <= 1e-4 * moved + 1e-9))
+        run.broken.push_back(text("ledger open by %.3g of %.3g J", defect, moved));
     return run;
 }
 
@@ -178,16 +186,22 @@ PlantRun run_plant(const Description& d, const Table& layout, std::uint64_t seed
 
 const char* name(Outcome outcome) {
     switch (outcome) {
-        case Outcome::agrees: return "agrees";
-        case Outcome::sensitive: return "sensitive";
-        case Outcome::reference_failed: return "reference failed";
-        case Outcome::disagrees: return "disagrees";
-        case Outcome::broken: return "broken";
+        case Outcome::agrees:
+            return "agrees";
+        case Outcome::sensitive:
+            return "sensitive";
+        case Outcome::reference_failed:
+            return "reference failed";
+        case Outcome::disagrees:
+            return "disagrees";
+        case Outcome::broken:
+            return "broken";
     }
     return "";
 }
 
-Deviation deviation(const Description& description, const Result& truth, const Result& other, const ComparisonOptions& options) {
+Deviation deviation(const Description& description, const Result& truth, const Result& other,
+                    const ComparisonOptions& options) {
     return deviation(table_of(description, truth), table_of(description, other), options);
 }
 
@@ -216,7 +230,9 @@ Description perturbed(Description d, double relative, std::uint64_t seed) {
 Comparison compare(const RandomSystem& system, std::uint64_t seed, const ComparisonOptions& options) {
     const Description& d = system.description;
     Comparison result;
-    const auto clock = [] { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); };
+    const auto clock = [] {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+    };
     const double begin = clock();
     const Result truth = run_reference(d, options);
     result.seconds_reference = clock() - begin;
@@ -280,23 +296,30 @@ std::string text_of(const Waveform& w) {
 
 std::string describe(const Description& d) {
     std::string s = d.name + "\n";
-    for (const auto& m : d.masses) s += text("  mass %s J=%.6g w0=%.8g\n", m.name.c_str(), m.inertia, m.initial_speed);
+    for (const auto& m : d.masses)
+        s += text("  mass %s J=%.6g w0=%.8g\n", m.name.c_str(), m.inertia, m.initial_speed);
     for (const auto& e : d.shafts)
-        s += text("  shaft %s %s-%s k=%.6g d=%.6g twist0=%.6g\n", e.name.c_str(), e.a.c_str(), e.b.c_str(), e.stiffness, e.damping, e.initial_twist);
-    for (const auto& k : d.dampers) s += text("  damper %s %s-%s d=%.6g\n", k.name.c_str(), k.a.c_str(), k.b.c_str(), k.damping);
+        s += text("  shaft %s %s-%s k=%.6g d=%.6g twist0=%.6g\n", e.name.c_str(), e.a.c_str(), e.b.c_str(),
+                  e.stiffness, e.damping, e.initial_twist);
+    for (const auto& k : d.dampers)
+        s += text("  damper %s %s-%s d=%.6g\n", k.name.c_str(), k.a.c_str(), k.b.c_str(), k.damping);
     for (const auto& c : d.clutches) {
         const auto& law = std::get<DryFriction>(c.friction);
-        s += text("  clutch %s %s-%s %.6g Nm static x%.4g falling %.3g over %.4g rad/s%s", c.name.c_str(), c.a.c_str(), c.b.c_str(),
-                  law.sliding_capacity, law.static_ratio, law.falling, law.falling_speed, c.initially_locked ? " locked" : "");
+        s += text("  clutch %s %s-%s %.6g Nm static x%.4g falling %.3g over %.4g rad/s%s", c.name.c_str(),
+                  c.a.c_str(), c.b.c_str(), law.sliding_capacity, law.static_ratio, law.falling,
+                  law.falling_speed, c.initially_locked ? " locked" : "");
         if (const auto* direct = std::get_if<ActuationDirect>(&c.actuation)) s += text_of(direct->profile);
         s += "\n";
     }
     for (const auto& g : d.gears)
-        s += text("  gear %s %s-%s u=%.6g eta=%.6g bearing=%.4g\n", g.name.c_str(), g.a.c_str(), g.b.c_str(), g.ratio, g.efficiency, g.bearing_torque);
+        s += text("  gear %s %s-%s u=%.6g eta=%.6g bearing=%.4g\n", g.name.c_str(), g.a.c_str(), g.b.c_str(),
+                  g.ratio, g.efficiency, g.bearing_torque);
     for (const auto& r : d.planetaries)
-        s += text("  row %s sun %s ring %s carrier %s u=%.6g eta=%.6g\n", r.name.c_str(), r.sun.c_str(), r.ring.c_str(), r.carrier.c_str(), r.ratio, r.efficiency);
+        s += text("  row %s sun %s ring %s carrier %s u=%.6g eta=%.6g\n", r.name.c_str(), r.sun.c_str(),
+                  r.ring.c_str(), r.carrier.c_str(), r.ratio, r.efficiency);
     for (const auto& t : d.sources)
-        s += text("  source %s on %s%s quadratic %.4g\n", t.name.c_str(), t.mass.c_str(), text_of(t.waveform).c_str(), t.quadratic);
+        s += text("  source %s on %s%s quadratic %.4g\n", t.name.c_str(), t.mass.c_str(),
+                  text_of(t.waveform).c_str(), t.quadratic);
     return s;
 }
 

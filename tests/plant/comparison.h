@@ -11,10 +11,11 @@ namespace shiftrig {
 
 struct ComparisonOptions {
     double seconds = 0.2;
-    double tolerance = 1e-4;       // of a signal's range
-    double range_floor = 1e-3;     // a range counts as at least this share of the largest of its unit
-    double perturbation = 1e-9;    // relative, on speeds, capacities and torques
-    double event_clearance = 2e-5; // torques jump with contact states: samples nearer to a change are left out [s]
+    double tolerance = 1e-4;     // of a signal's range
+    double range_floor = 1e-3;   // a range counts as at least this share of the largest of its unit
+    double perturbation = 1e-9;  // relative, on speeds, capacities and torques
+    double event_clearance =
+        2e-5;  // torques jump with contact states: samples nearer to a change are left out [s]
 };
 
 enum class Outcome {
@@ -22,20 +23,20 @@ enum class Outcome {
     sensitive,         // the reference itself moves more than the tolerance under the perturbation
     reference_failed,  // no consistent mode, or chatter without end: nothing to compare with
     disagrees,
-    broken,            // an invariant of the plant does not hold: not finite, constraint, momentum, ledger, determinism
+    broken,  // an invariant of the plant does not hold: not finite, constraint, momentum, ledger, determinism
 };
 const char* name(Outcome outcome);
 
 struct Comparison {
     Outcome outcome = Outcome::agrees;
-    double worst = 0;         // largest difference in units of the tolerance
-    double worst_speed = 0;   // the same over speeds and twists only
+    double worst = 0;        // largest difference in units of the tolerance
+    double worst_speed = 0;  // the same over speeds and twists only
     std::string worst_signal;
-    double worst_time = 0;    // [s]
+    double worst_time = 0;            // [s]
     std::vector<std::string> broken;  // invariants that do not hold, with numbers
     int fall_backs = 0, events = 0;
-    double energy_defect = 0;     // worst |defect| over the energy moved
-    double seconds_reference = 0; // compute time
+    double energy_defect = 0;      // worst |defect| over the energy moved
+    double seconds_reference = 0;  // compute time
 };
 
 // Largest |a − b| in units of the tolerance, over speeds and twists (and torques where both are unique).

@@ -71,19 +71,23 @@ class Builder {
         return d().masses.back().name;
     }
     std::string any_mass() {
-        return d().masses[static_cast<std::size_t>(dice_.integer(0, static_cast<int>(d().masses.size()) - 1))].name;
+        return d()
+            .masses[static_cast<std::size_t>(dice_.integer(0, static_cast<int>(d().masses.size()) - 1))]
+            .name;
     }
 
     void add_shaft(const std::string& a, const std::string& b) {
         const double j = std::min(inertia(a), inertia(b));
         const bool stiff = dice_.chance(0.15);
-        const double omega = 2 * std::numbers::pi * (stiff ? dice_.logarithmic(200, 1500) : dice_.logarithmic(2, 100));
+        const double omega =
+            2 * std::numbers::pi * (stiff ? dice_.logarithmic(200, 1500) : dice_.logarithmic(2, 100));
         const double damping_ratio = stiff ? dice_.logarithmic(0.05, 1) : dice_.logarithmic(0.003, 0.3);
         if (stiff) trait("stiff");
         Shaft shaft{.name = name("s"), .a = a, .b = b};
         shaft.stiffness = j * omega * omega;
         shaft.damping = 2 * damping_ratio * j * omega;
-        shaft.initial_twist = dice_.chance(0.3) ? dice_.uniform(-0.5, 0.5) * torque_level_ / shaft.stiffness : 0;
+        shaft.initial_twist =
+            dice_.chance(0.3) ? dice_.uniform(-0.5, 0.5) * torque_level_ / shaft.stiffness : 0;
         d().shafts.push_back(shaft);
     }
 
@@ -91,19 +95,35 @@ class Builder {
     Waveform engagement() {
         Waveform w;
         const double a = dice_.uniform(0.3, 1), b = dice_.uniform(0.3, 1);
-        const double t1 = dice_.chance(0.7) ? instants_[static_cast<std::size_t>(dice_.integer(0, static_cast<int>(instants_.size()) - 1))] : instant();
+        const double t1 = dice_.chance(0.7) ? instants_[static_cast<std::size_t>(
+                                                  dice_.integer(0, static_cast<int>(instants_.size()) - 1))]
+                                            : instant();
         const double t2 = t1 + 1e-3 * dice_.integer(2, 60);
         switch (dice_.integer(0, 6)) {
-            case 0: w.pieces = {{.from = t1, .offset = a}}; break;                                        // closes
-            case 1: w.pieces = {{.until = t1, .offset = a}}; break;                                       // opens
-            case 2: w.pieces = {{.until = t1, .offset = a}, {.from = t2, .offset = b}}; break;            // opens, closes
-            case 3: w.pieces = {{.from = t1, .until = t2, .slope = a / (t2 - t1)}, {.from = t2, .offset = a}}; break;
-            case 4:
-                w.pieces = {{.until = t1, .offset = a}, {.from = t1, .until = t2, .offset = a, .slope = -a / (t2 - t1)}};
+            case 0:
+                w.pieces = {{.from = t1, .offset = a}};
+                break;  // closes
+            case 1:
+                w.pieces = {{.until = t1, .offset = a}};
+                break;  // opens
+            case 2:
+                w.pieces = {{.until = t1, .offset = a}, {.from = t2, .offset = b}};
+                break;  // opens, closes
+            case 3:
+                w.pieces = {{.from = t1, .until = t2, .slope = a / (t2 - t1)}, {.from = t2, .offset = a}};
                 break;
-            case 5: w.pieces = {{.until = t1, .offset = a}, {.from = t1, .offset = b}}; break;            // steps
+            case 4:
+                w.pieces = {{.until = t1, .offset = a},
+                            {.from = t1, .until = t2, .offset = a, .slope = -a / (t2 - t1)}};
+                break;
+            case 5:
+                w.pieces = {{.until = t1, .offset = a}, {.from = t1, .offset = b}};
+                break;  // steps
             default:
-                w.pieces = {{.offset = 0.5 * a, .amplitude = 0.5 * b, .frequency = dice_.uniform(2, 15), .phase_time = dice_.uniform(0, 0.1)}};
+                w.pieces = {{.offset = 0.5 * a,
+                             .amplitude = 0.5 * b,
+                             .frequency = dice_.uniform(2, 15),
+                             .phase_time = dice_.uniform(0, 0.1)}};
         }
         return w;
     }
@@ -224,7 +244,8 @@ class Builder {
         }
         if (dice_.chance(0.2)) {
             const auto [a, b] = pair();
-            d().dampers.push_back({.name = name("k"), .a = a, .b = b, .damping = torque_level_ * dice_.logarithmic(1e-3, 0.1)});
+            d().dampers.push_back(
+                {.name = name("k"), .a = a, .b = b, .damping = torque_level_ * dice_.logarithmic(1e-3, 0.1)});
         }
     }
 
@@ -234,7 +255,11 @@ class Builder {
         const int brakes = many_clutch_paths_ ? dice_.integer(0, 2) : dice_.integer(0, 1);
         for (int i = 0; i < brakes; ++i) add_clutch(any_mass(), "");
         if (brakes > 0) trait("brake");
-        if (dice_.chance(0.3)) d().dampers.push_back({.name = name("k"), .a = any_mass(), .b = "", .damping = torque_level_ * dice_.logarithmic(1e-4, 0.01)});
+        if (dice_.chance(0.3))
+            d().dampers.push_back({.name = name("k"),
+                                   .a = any_mass(),
+                                   .b = "",
+                                   .damping = torque_level_ * dice_.logarithmic(1e-4, 0.01)});
     }
 
     void drive() {
@@ -246,7 +271,8 @@ class Builder {
         for (int i = dice_.integer(1, 3); i > 0; --i) {
             TorqueSource source;
             source.name = name("t");
-            source.mass = solid[static_cast<std::size_t>(dice_.integer(0, static_cast<int>(solid.size()) - 1))];
+            source.mass =
+                solid[static_cast<std::size_t>(dice_.integer(0, static_cast<int>(solid.size()) - 1))];
             Waveform::Piece piece{.offset = torque_level_ * dice_.uniform(-1, 1)};
             if (dice_.chance(0.4)) {
                 piece.amplitude = torque_level_ * dice_.uniform(0.2, 1);
@@ -276,7 +302,8 @@ class Builder {
             omega[i] = dice_.chance(0.2) ? 0 : dice_.uniform(-100, 100);
             j[i] = d().masses[static_cast<std::size_t>(i)].inertia;
         }
-        Eigen::MatrixXd c = Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(d().gears.size() + d().planetaries.size()));
+        Eigen::MatrixXd c =
+            Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(d().gears.size() + d().planetaries.size()));
         Eigen::Index column = 0;
         for (const auto& g : d().gears) {
             c(index(g.a), column) = 1;
@@ -307,7 +334,9 @@ class Builder {
 
 }  // namespace
 
-RandomSystem random_system(std::uint64_t seed, double seconds) { return Builder(seed, seconds).build(); }
+RandomSystem random_system(std::uint64_t seed, double seconds) {
+    return Builder(seed, seconds).build();
+}
 
 double impulse(const Waveform& waveform, double until) {
     double sum = 0;

@@ -35,11 +35,16 @@ bool parse(int argc, char** argv, Arguments& a) {
         }
         if (i + 1 >= argc) return false;
         const char* value = argv[++i];
-        if (key == "--count") a.count = std::atol(value);
-        else if (key == "--seed") a.seed = std::strtoull(value, nullptr, 10);
-        else if (key == "--seconds") a.options.seconds = std::atof(value);
-        else if (key == "--jobs") a.jobs = std::atol(value);
-        else return false;
+        if (key == "--count")
+            a.count = std::atol(value);
+        else if (key == "--seed")
+            a.seed = std::strtoull(value, nullptr, 10);
+        else if (key == "--seconds")
+            a.options.seconds = std::atof(value);
+        else if (key == "--jobs")
+            a.jobs = std::atol(value);
+        else
+            return false;
     }
     return a.count > 0 && a.jobs > 0 && a.options.seconds > 0.01;
 }
@@ -92,10 +97,14 @@ int main(int argc, char** argv) {
     for (auto& t : threads) t.join();
     std::printf("%ld systems of %g s:", arguments.count, arguments.options.seconds);
     for (const auto& [outcome, number] : tally) std::printf(" %ld %s;", number, name(outcome));
-    std::printf("\nlargest difference where they agree %.2g tolerances (1e-4 of the signal's range); %ld events, %ld fall-backs;\n"
-                "worst ledger defect %.1e of the energy moved; reference %.3f s per system\n",
-                worst_agreeing, events, fall_backs, worst_defect, reference_seconds / static_cast<double>(arguments.count));
+    std::printf(
+        "\nlargest difference where they agree %.2g tolerances (1e-4 of the signal's range); %ld events, %ld "
+        "fall-backs;\n"
+        "worst ledger defect %.1e of the energy moved; reference %.3f s per system\n",
+        worst_agreeing, events, fall_backs, worst_defect,
+        reference_seconds / static_cast<double>(arguments.count));
     const long incomparable = tally[Outcome::sensitive] + tally[Outcome::reference_failed];
-    const bool good = tally[Outcome::disagrees] == 0 && tally[Outcome::broken] == 0 && 100 * incomparable <= arguments.count;
+    const bool good = tally[Outcome::disagrees] == 0 && tally[Outcome::broken] == 0 &&
+                      100 * incomparable <= arguments.count;
     return good ? 0 : 1;
 }

@@ -86,7 +86,6 @@ double Solver::acceleration_tolerance(const Vector& column, const Torques& torqu
 
 bool Solver::consistent(const Mode& trial, const Torques& torques) {
     const double torque_tolerance = 1e-9 * (torques.free.lpNorm<Eigen::Infinity>() + 1e-6);
-    if (!responses_.of(trial).sound) return false;
     for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
         const auto& mesh = system_.meshes[m];
         const auto i = static_cast<Eigen::Index>(m);
@@ -362,7 +361,7 @@ Sample Solver::sample(When when) {
     s.input = energy_.input;
     s.dissipated = energy_.dissipated;
     s.stored = stored_energy();
-    s.unique = responses_.of(mode).redundancy == 0;
+    s.unique = responses_.of(mode).redundancy == 0 && responses_.of(mode).sound;
     for (std::size_t m = 0; m < system_.meshes.size(); ++m)
         if (mode.at_rest[m] && mode.mesh[m] != Hold::held) s.unique = false;
     return s;

@@ -13,7 +13,7 @@ struct Options {
     double step = 5e-6;        // largest step [s]; refined where the machine is stiffer
     double resolution = 0.05;  // step·(fastest rate) stays below this
     double grid = 1e-3;        // [s] of the samples
-    int event_limit = 20000;   // beyond it the run is given up as chattering
+    int event_limit = 2000;   // beyond it the run is given up as chattering
 };
 
 struct Change {
