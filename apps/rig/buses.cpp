@@ -6,7 +6,8 @@
 
 namespace shiftrig::rig {
 
-Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tick_ns, io::SignalTable& signals) {
+Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tick_ns, io::SignalTable& signals)
+    : silences_(setup.silences) {
     if (model.can.IsDefined()) mapping_ = io::can::parse_mapping(model.can, model.path);
     bus::Options options;
     options.tick_ns = tick_ns;
@@ -36,7 +37,17 @@ void Buses::receive(std::int64_t now_ns, io::SignalTable& signals) SHIFTRIG_REAL
 
 void Buses::send(std::int64_t now_ns, const io::SignalTable& signals) SHIFTRIG_REALTIME {
     for (auto& each : buses_) each.send(now_ns, signals);
-    if (node_) node_->tick(now_ns);
+    if (!node_) return;
+    const bool silent = silent_at(now_ns);
+    if (silent_ && !silent) node_->restart();
+    silent_ = silent;
+    if (!silent) node_->tick(now_ns);
+}
+
+bool Buses::silent_at(std::int64_t now_ns) const SHIFTRIG_REALTIME {
+    for (const auto& silence : silences_)
+        if (silence.from_ns <= now_ns && now_ns < silence.until_ns) return true;
+    return false;
 }
 
 bool Buses::command_valid() const noexcept {

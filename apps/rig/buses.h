@@ -14,9 +14,15 @@
 
 namespace shiftrig::rig {
 
+// The built-in controller is dead: it hears and says nothing, and begins anew afterwards.
+struct Silence {
+    std::int64_t from_ns = 0, until_ns = INT64_MAX;
+};
+
 struct BusSetup {
     std::vector<std::string> names;                   // as the user gives them; see apps/bus/bus.h
     std::optional<tcu::Calibration> built_in;         // the reference controller on `inprocess`
+    std::vector<Silence> silences;                    // of the built-in controller
     bool lockstep = false;
 };
 
@@ -37,13 +43,17 @@ class Buses {
     std::uint64_t messages_lost() const noexcept;
     std::vector<std::string> warnings() const;
     std::vector<std::string> summary() const;
-    const tcu::Controller* built_in() const noexcept { return node_ ? &node_->controller() : nullptr; }
+    const tcu::Node* built_in() const noexcept { return node_.get(); }
 
   private:
+    bool silent_at(std::int64_t now_ns) const SHIFTRIG_REALTIME;
+
     std::optional<io::can::Mapping> mapping_;
     std::unique_ptr<io::can::InProcessBus> wire_;     // ends: 0 the rig, 1 the built-in controller
     std::vector<bus::Bus> buses_;
     std::unique_ptr<tcu::Node> node_;
+    std::vector<Silence> silences_;
+    bool silent_ = false;
 };
 
 }  // namespace shiftrig::rig

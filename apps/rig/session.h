@@ -31,6 +31,7 @@ class Session {
     rt::LoopControl& control() noexcept { return loop_.control(); }  // stop, pause, single step, speed: any thread
     // The whole run, in the calling thread.
     const rt::LoopReport& run();
+    const rt::LoopReport& report() const noexcept { return loop_.report(); }  // whole when run() has returned
 
   private:
     void tick(const rt::Tick& tick);

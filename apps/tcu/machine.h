@@ -36,7 +36,7 @@ struct Commands {
     int selected_gear = 0;                        // being engaged, or engaged
     bool shifting = false;
     bool engaged = false;                         // the driveline passes torque
-    Mode mode = Mode::neutral;
+    Mode mode = Mode::listening;
 };
 
 inline int clutch_of(int gear) { return gear < 0 ? reverse_clutch : gear - 1; }

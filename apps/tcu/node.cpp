@@ -141,6 +141,11 @@ void Node::tick(std::int64_t now_ns) noexcept {
     if (commands_.mode != Mode::listening || asked) bus_.send(now_ns, signals_);
 }
 
+void Node::restart() noexcept {
+    controller_ = Controller(calibration_);
+    commands_ = Commands{};
+}
+
 bool Node::cycle_is_due(bool asked, std::int64_t now_ns) noexcept {
     // LCM asks every tick, and says what time it is there; CAN asks once a cycle.
     const auto rig_time = bus_.rig_time_ns();

@@ -24,6 +24,9 @@ class Node {
     // on LCM), and by the clock if nobody has asked for long.
     void tick(std::int64_t now_ns) SHIFTRIG_REALTIME;
 
+    // As if the controller had been switched off and on again: it forgets everything.
+    void restart() SHIFTRIG_REALTIME;
+
     const Controller& controller() const noexcept { return controller_; }
     const Commands& commands() const noexcept { return commands_; }
     bus::Bus& bus() noexcept { return bus_; }

@@ -34,8 +34,7 @@ struct Response {
     Matrix friction_torque;  // T of held devices, zero rows for the others
     Matrix projector;        // J-orthogonal projector of speeds onto the constraints
     int redundancy = 0;      // dependent rows among meshes and held friction devices
-    bool sound =
-        true;  // held meshes are independent of everything else that is held: their loss torque is unique
+    bool sound = true;       // held meshes are independent of everything else that is held
 };
 
 class Responses {
@@ -47,8 +46,6 @@ class Responses {
     Response build(const Mode& mode) const;
     const System& system_;
     std::map<std::vector<int>, Response> cache_;
-    Mode last_mode_;
-    const Response* last_ = nullptr;
 };
 
 }  // namespace shiftrig::reference

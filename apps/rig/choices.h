@@ -1,0 +1,30 @@
+// From what a user chose (files, buses, a controller in words) to a rig's Setup.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/rig/rig.h"
+
+namespace shiftrig::rig {
+
+struct Choices {
+    std::string model, scenario;     // files; one of them may be empty: a scenario names its model
+    double rate_hz = 1000;           // of the ticks
+    int substeps = 1;                // plant steps per tick
+    std::vector<std::string> buses;  // empty: inprocess, where the model says what frames mean
+    std::string controller;          // "builtin[:FILE]", "none", a command to start; empty: the scenario's, else
+                                     // builtin on the in-process bus and nobody elsewhere
+    std::string kernel = "auto";     // auto, portable, avx2, avx512
+    bool lockstep = false;
+};
+
+// Reads the files and settles what was left open. Throws InputError and std::invalid_argument: one clear line.
+Setup make_setup(const Choices& choices);
+// The same for a scenario in memory (choices.scenario is not looked at).
+Setup make_setup(const Choices& choices, io::ScenarioFile scenario);
+
+// The command to be started as the controller; empty if it is none, or built in.
+std::string controller_command(const Choices& choices);
+
+}  // namespace shiftrig::rig

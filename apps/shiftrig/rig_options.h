@@ -1,0 +1,35 @@
+// The options of every command that runs a rig, in one place.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "apps/rig/choices.h"
+#include "rt/loop.h"
+#include "rt/thread.h"
+
+namespace shiftrig::cli {
+
+struct RigOptions {
+    rig::Choices choices;
+    std::string pace = "wall";          // wall, lockstep, free
+    double factor = 1;                  // simulated per wall time
+    std::optional<double> duration_s;   // else the scenario's, else without end
+    std::int64_t catch_up = 100;        // [ticks]
+    std::string overrun = "skip";       // skip, abort
+    double answer_timeout_s = 1;        // lockstep
+    int priority = 80;                  // FIFO; 0: none
+    std::vector<int> processors;
+
+    void add_to(CLI::App& app);
+    // Of the loop of a rig built from `choices`.
+    rt::LoopSettings loop(const rig::Setup& setup) const;
+    rt::Pace pacing() const;
+};
+
+// What a wall-paced loop asks of the machine, for the process and for the calling thread. Nothing in other paces.
+rt::Refusals prepare_process(const RigOptions& options, rt::AwakeProcessors& awake);
+rt::Refusals prepare_thread(const RigOptions& options);
+
+}  // namespace shiftrig::cli

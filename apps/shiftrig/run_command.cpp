@@ -1,0 +1,211 @@
+// shiftrig run: the rig at work.
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <thread>
+
+#include "analysis/scorecard.h"
+#include "apps/rig/session.h"
+#include "apps/shiftrig/child.h"
+#include "apps/shiftrig/command.h"
+#include "apps/shiftrig/live_line.h"
+#include "apps/shiftrig/loop_report.h"
+#include "apps/shiftrig/rig_options.h"
+#include "io/recording/csv.h"
+#include "io/recording/event_names.h"
+#include "io/recording/reader.h"
+
+namespace shiftrig::cli {
+
+namespace {
+
+struct RunOptions : RigOptions {
+    std::string record, csv, trace;
+    bool json = false;
+};
+
+// SIGINT and SIGTERM end the run as if its time were over.
+std::atomic<rt::LoopControl*> running{nullptr};
+
+void on_signal(int) {
+    if (rt::LoopControl* control = running.load()) control->stop();
+}
+
+class SignalsStop {
+  public:
+    explicit SignalsStop(rt::LoopControl& control) {
+        running = &control;
+        struct sigaction action = {};
+        action.sa_handler = on_signal;
+        sigaction(SIGINT, &action, nullptr);
+        sigaction(SIGTERM, &action, nullptr);
+    }
+    ~SignalsStop() { running = nullptr; }
+};
+
+// What the session needs beside the rig, and what is left of it afterwards.
+struct Beside {
+    std::unique_ptr<io::RecordingWriter> recording;
+    std::string recording_path;  // "" if nothing is recorded; a temporary file where only CSV was asked for
+    std::unique_ptr<rig::Collector> collector;
+    std::unique_ptr<rt::Trace> trace;
+    io::RecordingSummary recorded;
+};
+
+Beside prepare(const RunOptions& options, const rig::Rig& rig, const rt::LoopSettings& loop) {
+    Beside beside;
+    beside.recording_path = !options.record.empty() ? options.record : options.csv.empty() ? "" : options.csv + ".lcmlog";
+    if (!beside.recording_path.empty()) beside.recording = std::make_unique<io::RecordingWriter>(beside.recording_path);
+    constexpr std::int64_t an_hour_of_ticks = 3'600'000;  // the collector takes what fits its memory of it
+    beside.collector = std::make_unique<rig::Collector>(rig, std::min(loop.slots, an_hour_of_ticks));
+    if (!options.trace.empty()) beside.trace = std::make_unique<rt::Trace>(std::size_t{200'000});
+    return beside;
+}
+
+nlohmann::json event_json(const analysis::Change& change) {
+    nlohmann::json event = {{"time_s", change.event.time}, {"text", change.text}};
+    if (change.device.empty()) return event;
+    event["kind"] = io::name(change.event.kind);
+    event["device"] = change.device;
+    event["torque_nm"] = change.event.torque;
+    event["capacity_nm"] = change.event.capacity;
+    event["slip_rad_s"] = change.event.slip;
+    return event;
+}
+
+nlohmann::json result_json(const rig::Rig& rig, const rt::LoopReport& report, const analysis::Run& run,
+                           const analysis::Scorecard& scorecard) {
+    const double wall = static_cast<double>(report.ended - report.began) * 1e-9;
+    nlohmann::json result;
+    result["ticks"] = report.executed;
+    result["sim_time_s"] = rig.sim_time();
+    result["overruns"] = report.overruns;
+    result["real_time_factor"] = wall > 0 ? rig.sim_time() / wall : 0;
+    result["shifts"] = analysis::to_json(scorecard);
+    result["events"] = nlohmann::json::array();
+    for (const auto& change : run.changes) result["events"].push_back(event_json(change));
+    result["final"] = nlohmann::json::object();
+    for (int i = 0; i < rig.signals().size(); ++i)
+        result["final"][io::column_name(rig.signals().signal(i))] = rig.value(i);
+    result["loop"] = to_json(report);
+    return result;
+}
+
+// Runs the loop in a thread of its own; this one shows the live line and watches the controller's process.
+rt::Refusals run_loop(rig::Session& session, const RunOptions& options, LiveLine& live, Child* controller) {
+    rt::Refusals refusals;
+    std::atomic<bool> done{false};
+    std::thread plant([&] {
+        refusals = prepare_thread(options);
+        session.run();
+        done = true;
+    });
+    while (!done) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        live.show();
+        if (controller)
+            if (const auto how = controller->ended()) std::cerr << (live.shown() ? "\n" : "") << *how << '\n';
+    }
+    plant.join();
+    live.end();
+    return refusals;
+}
+
+// Closes what was recorded; false if something of it is lost.
+bool finish(const RunOptions& options, Beside& beside) {
+    bool whole = true;
+    if (beside.recording) {
+        beside.recorded = beside.recording->end();
+        whole = beside.recorded.error.empty();
+        if (!whole) std::cerr << beside.recorded.error << '\n';
+        if (beside.recorded.lost > 0)
+            std::cerr << beside.recording_path << ": " << beside.recorded.lost << " ticks were not kept: the disk did not keep up\n";
+    }
+    if (!options.csv.empty()) {
+        io::RecordingReader reader(beside.recording_path);
+        io::export_csv(reader, options.csv);
+        if (options.record.empty()) unlink(beside.recording_path.c_str());
+    }
+    if (beside.trace) {
+        std::ofstream file(options.trace);
+        beside.trace->write(file);
+        if (!file) std::cerr << options.trace << ": could not be written\n", whole = false;
+    }
+    return whole;
+}
+
+void print_summary(const rig::Rig& rig, const rt::LoopReport& report, const analysis::Scorecard& scorecard) {
+    const double wall = static_cast<double>(report.ended - report.began) * 1e-9;
+    std::printf("%lld ticks, %.6g s simulated in %.3g s (%.3g times real time)\n", static_cast<long long>(report.executed),
+                rig.sim_time(), wall, wall > 0 ? rig.sim_time() / wall : 0);
+    std::cout << describe(report);
+    if (!scorecard.shifts.empty()) std::cout << '\n' << analysis::to_text(scorecard);
+}
+
+int run(const RunOptions& options) {
+    rig::Choices choices = options.choices;
+    choices.lockstep = options.pacing() == rt::Pace::lockstep;
+    rig::Rig rig(rig::make_setup(choices));
+    for (const auto& warning : rig.buses().warnings()) std::cerr << warning << '\n';
+
+    rt::AwakeProcessors awake;
+    rt::Refusals refusals = prepare_process(options, awake);
+    const rt::LoopSettings loop = options.loop(rig.setup());
+    Beside beside = prepare(options, rig, loop);
+    LiveLine live(rig);
+
+    rig::SessionOptions session_options;
+    session_options.loop = loop;
+    session_options.recording = beside.recording.get();
+    session_options.collector = beside.collector.get();
+    session_options.trace = beside.trace.get();
+    session_options.after = [&live](rig::Rig& each, const rt::Tick&) { live.take(each); };
+    rig::Session session(rig, std::move(session_options));
+
+    std::optional<Child> controller;
+    if (const auto command = rig::controller_command(options.choices); !command.empty()) controller.emplace(command);
+    {
+        const SignalsStop signals_stop(session.control());
+        for (auto& refusal : run_loop(session, options, live, controller ? &*controller : nullptr))
+            refusals.push_back(std::move(refusal));
+    }
+    controller.reset();
+
+    const bool whole = finish(options, beside);
+    for (const auto& refusal : refusals) std::cerr << "this machine does not grant " << rt::to_string(refusal) << '\n';
+    for (const auto& line : rig.buses().summary()) std::cerr << line << '\n';
+    if (beside.collector->ticks_left_out() > 0)
+        std::cerr << "shifts are judged without the last " << beside.collector->ticks_left_out() << " ticks, which did not fit the memory\n";
+
+    const auto& report = session.report();
+    const analysis::Run collected = beside.collector->finish(rig);
+    const auto scorecard = analysis::score(collected);
+    if (options.json)
+        std::cout << result_json(rig, report, collected, scorecard).dump() << '\n';
+    else
+        print_summary(rig, report, scorecard);
+    const bool ended_well = report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped;
+    return whole && ended_well ? good : failed;
+}
+
+Command::Run declare(CLI::App& app) {
+    auto options = std::make_shared<RunOptions>();
+    options->add_to(app);
+    app.add_option("--record", options->record, "recording (an LCM log; .zst compresses)");
+    app.add_option("--csv", options->csv, "every signal of every tick");
+    app.add_option("--trace", options->trace, "what the loop did when, for ui.perfetto.dev");
+    app.add_flag("--json", options->json, "end with one JSON object on standard output");
+    return [options] { return run(*options); };
+}
+
+const Command command("run", "run the machine, its buses and its controller", declare);
+
+}  // namespace
+
+}  // namespace shiftrig::cli
