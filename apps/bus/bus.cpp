@@ -1,5 +1,6 @@
 #include "apps/bus/bus.h"
 
+#include "io/can/open_port.h"
 #include "io/input_error.h"
 
 namespace shiftrig::bus {
@@ -23,10 +24,6 @@ io::lcm::LinkOptions lcm_options(const Options& options) {
     return lcm;
 }
 
-std::unique_ptr<io::can::CanPort> open_port(const std::string& name) {
-    throw io::InputError("bus " + name + ": unknown kind; it is inprocess, can:INTERFACE, udpcan:ADDRESS:PORT or lcm:URL");
-}
-
 }  // namespace
 
 Bus::Bus(const std::string& name, const io::can::Mapping* mapping, io::SignalTable& signals, const Options& options)
@@ -35,9 +32,12 @@ Bus::Bus(const std::string& name, const io::can::Mapping* mapping, io::SignalTab
         lcm_.emplace(name.substr(4), signals, lcm_options(options));
         return;
     }
-    owned_ = open_port(name);
+    if (!name.starts_with("can:") && !name.starts_with("udpcan:"))
+        throw io::InputError("bus " + name + ": unknown kind; it is inprocess, can:INTERFACE, udpcan:GROUP:PORT or lcm:URL");
+    const auto can = can_options(options);
+    owned_ = io::can::open_port(name, io::can::filters_of(*mapping, can.role));
     port_ = owned_.get();
-    can_.emplace(*mapping, *port_, signals, can_options(options));
+    can_.emplace(*mapping, *port_, signals, can);
 }
 
 Bus::Bus(const std::string& name, io::can::CanPort& port, const io::can::Mapping& mapping, io::SignalTable& signals,

@@ -1,8 +1,10 @@
 #!/bin/sh
-# Runs a command in a network of its own, where the loopback carries LCM's multicast group and nothing else:
+# Runs a command in a network of its own, where the loopback carries LCM's and python-can's multicast groups and
+# nothing else:
 # tests neither disturb the host's network nor hear it. usage: with_multicast.sh COMMAND [ARGUMENT]...
 set -e
 exec unshare --map-root-user --net sh -c '
     ip link set lo up multicast on
     ip route add 239.255.76.67/32 dev lo
+    ip route add 239.74.163.2/32 dev lo
     exec "$@"' sh "$@"
