@@ -30,7 +30,7 @@ std::string explain(const Model& model, const Event& event) {
         case EventKind::drive_side:
             return line + (event.slip < 0 ? "is driven" : "drives") + say(": torque on its first link %.1f %s", event.torque, unit);
         case EventKind::tie_up:
-            return line + say("is part of a closed loop: the split of %.1f %s is not unique", event.torque, unit);
+            return line + say("carries %.1f %s in a loop of closed devices: the split is not unique", event.torque, unit);
         case EventKind::fall_back: return line + "has more state changes in this step than are located: the rest act from the next step on";
         case EventKind::engine_stalls: return line + say("stalls at %.1f rad/s", event.slip);
         case EventKind::engine_starts: return line + say("runs at %.1f rad/s", event.slip);

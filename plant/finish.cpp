@@ -181,9 +181,9 @@ void report_changes(Work& w, const Mode& mode) {
         log_event(w, EventKind::drive_side, m.pairs + k, w.start, s.torque[m.pairs + k], 0, loss_exponent(is));
     }
     double& tie_up = w.next[m.layout.tie_up];
-    if (mode.redundant) {
-        w.outputs.certificate.flags |= 1;
-        if (tie_up == 0) log_event(w, EventKind::tie_up, mode.rows[0], end, s.torque[mode.rows[0]], 0, 0);
+    if (mode.redundant) w.outputs.certificate.flags |= 1;
+    for (int k = 0; mode.redundant && tie_up == 0 && k < m.pairs; ++k) {
+        if (mode.bound[k] & shares_load) log_event(w, EventKind::tie_up, k, end, s.torque[k], s.holding[k], 0);
     }
     tie_up = mode.redundant ? 1 : 0;
     if (w.outputs.certificate.fall_backs > 0) log_event(w, EventKind::fall_back, -1, end, 0, 0, 0);

@@ -138,7 +138,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int*) SHIFTRI
     for (int k = 0; k < m.meshes; ++k) {
         const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
         scaled_column(m, mesh.motion(), column);
-        mode.bound[m.pairs + k] = rest() < dependent;
+        mode.bound[m.pairs + k] = rest() < dependent ? by_active_set : 0;
     }
     for (int k = 0; k < m.meshes; ++k) {
         const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
@@ -148,12 +148,12 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int*) SHIFTRI
     }
     for (int k = 0; k < m.pairs; ++k) {
         scaled_column(m, s.pairs[static_cast<std::size_t>(k)].links, column);
-        mode.bound[k] = rest() < dependent;
+        mode.bound[k] = rest() < dependent ? by_active_set : 0;
     }
     for (int k = 0; k < m.meshes; ++k) {  // moving meshes that stuck ones hold
         const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
         scaled_column(m, mesh.motion(), column);
-        if (rest() < dependent) mode.bound[m.pairs + k] |= 2;
+        if (rest() < dependent) mode.bound[m.pairs + k] |= by_stuck_meshes;
     }
     const int rows = mode.row_count, rank = mode.rank;
     mode.redundant = rows > rank;
@@ -214,6 +214,15 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int*) SHIFTRI
                 for (int r = 0; r < rows; ++r) sum += g[r * rank + k] * g[r * rank + l];
                 square[l * rank + k] = sum;
             }
+        }
+        // A row that the others cannot replace has gᵀ(G Gᵀ)⁻¹g = 1; less means that it shares its load.
+        double* factor = transmission;  // not yet in use
+        for (int r = 0; r < rows; ++r) {
+            if (mode.rows[r] >= m.pairs) continue;
+            std::copy(square, square + rank * rank, factor);
+            std::copy(g + r * rank, g + (r + 1) * rank, column);
+            solve(factor, rank, column, 1);
+            if (dot(g + r * rank, column, rank) < 1 - 1e-9) mode.bound[mode.rows[r]] |= shares_load;
         }
         solve(square, rank, right, n);
         for (int j = 0; j < n; ++j) {

@@ -26,10 +26,17 @@ struct StepOperators {
     double* combined = nullptr;  // Q1−3Q2+4Q3, 4Q2−8Q3, 4Q3−Q2   panels, states × 3 forces
 };
 
+// Bits of Mode::bound: why a pair does not slip, a mesh does not move.
+enum Bound : unsigned char {
+    by_active_set = 1,   // others of the active set hold it at zero: it cannot change its state by itself
+    by_stuck_meshes = 2, // meshes only: held by a stuck mesh
+    shares_load = 4,     // locked pair whose torque is not unique: it is in a loop of closed devices
+};
+
 struct Mode {
     std::uint64_t last_use = 0;      // 0: empty
     unsigned char* key = nullptr;    // per pair 1 locked; per mesh 0 stuck, 1 x = +1, 2 x = −1
-    unsigned char* bound = nullptr;  // per pair and mesh: its slip is held at zero by others of the active set
+    unsigned char* bound = nullptr;  // per pair and mesh: bits of Bound
     int* rows = nullptr;             // active torque row → unknown (pair, mesh, loss of mesh)
     int row_count = 0;
     int base_rank = 0;               // of locked pairs and meshes

@@ -1,0 +1,171 @@
+// Contact states: when pairs close and open, what they carry, and what a machine at rest does.
+#include "rig.h"
+
+namespace shiftrig::plant {
+namespace {
+
+Mass body(const std::string& name, double inertia, double speed = 0) {
+    return {name, inertia, Motion::translating, speed};
+}
+
+Description two_inertias() {
+    Description d;
+    d.name = "two inertias";
+    d.masses = {mass("fast", 2.6, 188.5), mass("slow", 1.0)};
+    d.clutches = {clutch("C", "fast", "slow", 1500)};
+    return d;
+}
+
+TEST(Clutch, TwoInertiasCloseAtTheClosedFormsTimeSpeedAndHeat) {
+    const double dw = 188.5, reduced = 2.6 / 3.6;
+    for (const double h : {1e-4, 1e-3, 5e-3}) {
+        Rig rig(two_inertias(), {h, KernelKind::automatic});
+        rig.run(0.2);
+        const auto locks = rig.times(EventKind::lock, "C");
+        ASSERT_EQ(locks.size(), 1u);
+        EXPECT_NEAR(locks[0], reduced * dw / 1500, 1e-12);
+        EXPECT_NEAR(rig.out("mass.fast.speed"), 2.6 * dw / 3.6, 1e-11);
+        EXPECT_DOUBLE_EQ(rig.out("mass.fast.speed"), rig.out("mass.slow.speed"));
+        EXPECT_NEAR(rig.out("clutch.C.heat"), 0.5 * reduced * dw * dw, 1e-8);
+        EXPECT_NEAR(rig.out("energy.defect"), 0, 1e-7);
+    }
+}
+
+TEST(Clutch, InternalTorqueOfAClosedClutchIsTable1RowByRow) {
+    const double rows[][5] = {{1, 1, 10, -1, 5.5}, {2, 1, 10, -1, 4}, {5, 1, 10, -1, 2.5}, {9, 1, 10, -1, 1.9},
+                              {1, 9, 10, -1, 9.1}, {9, 1, 1, -1, 1},  {9, 1, 1, 1, -0.8}};
+    for (const auto& [j1, j2, m1, m2, m12] : rows) {
+        Description d = two_inertias();
+        d.masses = {mass("fast", j1), mass("slow", j2)};
+        d.clutches[0].initially_locked = true;
+        d.sources = {source("fast", constant(m1)), source("slow", constant(m2))};
+        Rig rig(d);
+        rig.step();
+        EXPECT_NEAR(rig.out("clutch.C.torque"), m12, 1e-12);
+        EXPECT_EQ(rig.out("clutch.C.state"), 0);
+    }
+}
+
+// The clutch carries M12, not M1: it holds although the torque on its first mass is beyond its capacity.
+TEST(Clutch, StuckClutchCarriesLoadBelowItsCapacity) {
+    Description d = two_inertias();
+    d.masses = {mass("fast", 9), mass("slow", 1)};
+    d.clutches = {clutch("C", "fast", "slow", 2)};
+    d.clutches[0].initially_locked = true;
+    d.sources = {source("fast", constant(10)), source("slow", constant(-1))};  // M12 = 1.9
+    Rig rig(d);
+    rig.run(0.1);
+    EXPECT_TRUE(rig.times(EventKind::break_away, "C").empty());
+    EXPECT_EQ(rig.out("clutch.C.state"), 0);
+}
+
+TEST(Clutch, BreaksAwayWhereItsInternalTorquePassesTheStaticCapacity) {
+    Description d = two_inertias();
+    d.masses = {mass("fast", 1), mass("slow", 1)};
+    d.clutches = {clutch("C", "fast", "slow", 5, 1.2)};
+    d.clutches[0].initially_locked = true;
+    Waveform ramp;
+    ramp.pieces.push_back({});
+    ramp.pieces[0].from = 0;
+    ramp.pieces[0].slope = 100;
+    d.sources = {source("fast", ramp)};  // M12 = 50 t, 6 Nm at 0.12 s
+    Rig rig(d, {7e-3, KernelKind::automatic});
+    rig.run(0.14);
+    const auto opens = rig.times(EventKind::break_away, "C");
+    ASSERT_EQ(opens.size(), 1u);
+    EXPECT_NEAR(opens[0], 0.12, 1e-9);
+    // From then on 5 Nm slide: Δω̇ = 100 t − 10.
+    const double t = rig.state.time() - 0.12;
+    EXPECT_NEAR(rig.out("clutch.C.slip"), 2 * t + 50 * t * t, 1e-9);
+}
+
+// A load on a belt: m = k = 1, belt 0.2 m/s, static 1, sliding 0.7; seen from the belt the wall moves.
+TEST(Clutch, StickSlipHasThePeriodOfTheClosedForm) {
+    for (const double h : {1e-3, 5e-3, 20e-3}) {
+        Description d;
+        d.name = "stick-slip";
+        d.masses = {body("load", 1), body("wall", 1e12, -0.2)};
+        d.clutches = {clutch("belt", "load", "", 0.7, 1 / 0.7)};
+        d.shafts = {{"spring", "load", "wall", 1, 0, 0}};
+        Rig rig(d, {h, KernelKind::automatic});
+        double furthest = 0;
+        while (rig.state.time() < 60) {
+            rig.step();
+            furthest = std::max(furthest, std::fabs(rig.out("shaft.spring.twist")));
+        }
+        const auto slips = rig.times(EventKind::break_away, "belt"), sticks = rig.times(EventKind::lock, "belt");
+        ASSERT_GE(slips.size(), 7u);
+        for (std::size_t i = 2; i < slips.size(); ++i) {
+            EXPECT_NEAR(slips[i] - slips[i - 1], 7.317598, 5e-6) << "h = " << h;
+        }
+        const std::size_t first = sticks[0] > slips[0] ? 0 : 1;
+        EXPECT_NEAR(sticks[first] - slips[0], 4.317598, 5e-6);
+        EXPECT_NEAR(furthest, 1.060555, 1e-4);
+    }
+}
+
+TEST(Clutch, NextStepRuleHasTheLargerErrorOfItsOrder) {
+    Description d = two_inertias();
+    d.transition = Transition::next_step;
+    Rig rig(d);
+    rig.run(0.2);
+    const auto locks = rig.times(EventKind::lock, "C");
+    ASSERT_EQ(locks.size(), 1u);
+    EXPECT_NEAR(locks[0], 0.091, 1e-12);  // the end of the step in which the slip changed its sign
+    EXPECT_NEAR(rig.out("mass.fast.speed"), 2.6 * 188.5 / 3.6, 1e-9);  // the join keeps momentum
+    EXPECT_EQ(rig.outputs.certificate.fall_backs, 0);
+}
+
+TEST(TieUp, ParallelClutchesShareInProportionToTheirCapacities) {
+    Description d;
+    d.name = "parallel";
+    d.masses = {mass("a", 1), mass("b", 1)};
+    d.clutches = {clutch("C10", "a", "b", 10), clutch("C30", "a", "b", 30)};
+    d.clutches[0].initially_locked = d.clutches[1].initially_locked = true;
+    d.sources = {source("a", constant(25))};
+    Rig rig(d);
+    rig.step();
+    EXPECT_NEAR(rig.out("clutch.C10.torque"), 3.125, 1e-12);
+    EXPECT_NEAR(rig.out("clutch.C30.torque"), 9.375, 1e-12);
+    EXPECT_TRUE(rig.outputs.certificate.flags & 1);
+    EXPECT_EQ(rig.times(EventKind::tie_up, "C10").size(), 1u);
+    EXPECT_EQ(rig.times(EventKind::tie_up, "C30").size(), 1u);
+}
+
+TEST(TieUp, TwoPathsOfDifferentRatioBringEverythingToRest) {
+    Description d;
+    d.name = "two gears at once";
+    d.masses = {mass("in", 1, 50), mass("p1", 0.1, 25), mass("p2", 0.1, 10), mass("out", 2, 10)};
+    Gear g1, g2;
+    g1.name = "g1", g1.a = "p1", g1.b = "out", g1.ratio = 2.5;
+    g2.name = "g2", g2.a = "p2", g2.b = "out", g2.ratio = 1;
+    d.gears = {g1, g2};
+    d.clutches = {clutch("c1", "in", "p1", 200), clutch("c2", "in", "p2", 200)};
+    Rig rig(d);
+    rig.run(2);
+    for (double speed : rig.state.speeds()) EXPECT_NEAR(speed, 0, 1e-12);
+    EXPECT_EQ(rig.out("clutch.c1.state"), 0);
+    EXPECT_EQ(rig.out("clutch.c2.state"), 0);
+    EXPECT_NEAR(rig.out("energy.defect"), 0, 1e-6);
+}
+
+TEST(Standstill, ABrakeHoldsALoadWithoutCreepAndLetsItGoAboveItsCapacity) {
+    Description d;
+    d.name = "hoist";
+    d.masses = {mass("drum", 3, 5)};
+    d.clutches = {clutch("B", "drum", "", 100, 1.1, ActuationDirect{{}, 1})};
+    TorqueSource load = source("drum", constant(-60));
+    load.input = true;
+    d.sources = {load};
+    Rig rig(d);
+    rig.run(100);
+    EXPECT_EQ(rig.out("mass.drum.speed"), 0);
+    EXPECT_NEAR(rig.out("clutch.B.torque"), -60, 1e-12);
+    rig.in("source.drum_torque.torque") = -51;  // 111 Nm beyond 110 static
+    rig.step();
+    EXPECT_EQ(rig.out("clutch.B.state"), 1);
+    EXPECT_NEAR(rig.out("mass.drum.speed"), -11. / 3 * 1e-3, 1e-12);
+}
+
+}  // namespace
+}  // namespace shiftrig::plant

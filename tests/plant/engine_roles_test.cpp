@@ -1,0 +1,183 @@
+// Model, Operators, State, Inputs, Outputs and Scratch never mix: what may be dropped, copied or poisoned
+// without changing a bit; and that stepping allocates nothing.
+#include <cstdlib>
+#include <cstring>
+#include <new>
+
+#include "io/model_file.h"
+#include "rig.h"
+
+namespace {
+thread_local long allocations = 0;
+}
+
+[[gnu::noinline]] void* operator new(std::size_t size) {
+    ++allocations;
+    if (void* memory = std::malloc(size)) return memory;
+    throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace shiftrig::plant {
+namespace {
+
+Description tractor() { return io::read_model(SHIFTRIG_CONFIG "/tractor.yaml").description; }
+
+// A shift F2 → F3 under the plough, a lifted throttle, a stop with the brake: every kind of event.
+struct Drive {
+    explicit Drive(const BuildOptions& options = {1e-3, KernelKind::portable}) : rig(tractor(), options) {
+        rig.in("driver.throttle") = 0.73;
+        rig.in("environment.draft") = 1;
+        rig.in("clutch.F2.pressure_command") = 18e5;
+        start(rig.model, rig.state, {{"Fc", "F2"}, {{"engine", 188}}}, rig.inputs);
+    }
+    void step() {
+        const auto n = rig.state.steps();
+        if (n == 300) rig.in("clutch.F3.pressure_command") = 2e5;
+        if (n == 450) rig.in("clutch.F3.pressure_command") = 11.5e5, rig.in("clutch.F2.pressure_command") = 0;
+        if (n == 1000) rig.in("driver.throttle") = 0;
+        if (n == 1200) rig.in("clutch.F3.pressure_command") = 0, rig.in("driver.brake") = 1;
+        if (n == 1900) rig.in("environment.grade") = 0.15;
+        rig.step();
+    }
+    Rig rig;
+};
+constexpr int drive_steps = 2500;
+
+bool same(const Rig& a, const Rig& b) {
+    return std::memcmp(a.state.bytes().data(), b.state.bytes().data(), a.state.bytes().size()) == 0 &&
+           a.outputs.value.size() == b.outputs.value.size();
+}
+bool same_outputs(const Rig& a, const Rig& b) {
+    for (std::size_t i = 0; i < a.outputs.value.size(); ++i) {
+        if (a.model.outputs()[i].name == "certificate.mode_misses") continue;  // says what was rebuilt
+        if (std::memcmp(&a.outputs.value[i], &b.outputs.value[i], sizeof(double)) != 0) return false;
+    }
+    return true;
+}
+
+TEST(Roles, DroppedOperatorsAndPoisonedScratchChangeNoBit) {
+    Drive plain, hard;
+    for (int n = 0; n < drive_steps; ++n) {
+        plain.step();
+        if (n % 7 == 0) hard.rig.operators.drop();
+        hard.rig.scratch.fill_with_nan();
+        hard.step();
+        ASSERT_TRUE(same(plain.rig, hard.rig)) << "step " << n;
+        ASSERT_TRUE(same_outputs(plain.rig, hard.rig)) << "step " << n;
+    }
+    EXPECT_GT(plain.rig.times(EventKind::lock, "F3").size(), 0u);
+    EXPECT_GT(plain.rig.times(EventKind::mesh_sticks, "axle_drive").size(), 0u);
+    EXPECT_EQ(plain.rig.fall_backs, 0);
+}
+
+TEST(Roles, ASnapshotContinuesBitForBitInAnotherMachine) {
+    Drive first;
+    for (int n = 0; n < 480; ++n) first.step();
+    Drive second;
+    ASSERT_TRUE(second.rig.state.restore(first.rig.state.bytes()));
+    second.rig.inputs = first.rig.inputs;
+    for (int n = 480; n < drive_steps; ++n) {
+        first.step();
+        second.step();
+        ASSERT_TRUE(same(first.rig, second.rig) && same_outputs(first.rig, second.rig)) << "step " << n;
+    }
+}
+
+TEST(Roles, ASnapshotOfAnotherSizeIsRefused) {
+    Drive drive;
+    const std::vector<std::byte> wrong(drive.rig.state.bytes().size() - 8);
+    EXPECT_FALSE(drive.rig.state.restore(wrong));
+}
+
+TEST(Roles, SteppingAllocatesNothing) {
+    Drive drive;
+    drive.rig.events.reserve(10000);
+    std::string sink;
+    long during = 0;
+    for (int n = 0; n < drive_steps; ++n) {
+        const long before = allocations;
+        plant::step(drive.rig.model, drive.rig.operators, drive.rig.state, drive.rig.inputs, drive.rig.outputs,
+                    drive.rig.scratch);
+        during += allocations - before;
+        if (n == 300) drive.rig.in("clutch.F3.pressure_command") = 2e5;
+        if (n == 450) drive.rig.in("clutch.F3.pressure_command") = 11.5e5, drive.rig.in("clutch.F2.pressure_command") = 0;
+        if (n == 1200) drive.rig.in("clutch.F3.pressure_command") = 0, drive.rig.in("driver.brake") = 1;
+    }
+    EXPECT_EQ(during, 0);
+    const long before = allocations;
+    observe(drive.rig.model, drive.rig.operators, drive.rig.state, drive.rig.inputs, drive.rig.outputs,
+            drive.rig.scratch);
+    EXPECT_EQ(allocations - before, 0);
+}
+
+TEST(Roles, ObservingChangesNothingAndShowsWhatTheStepEndedWith) {
+    Drive drive;
+    for (int n = 0; n < 200; ++n) drive.step();
+    const std::vector<std::byte> before(drive.rig.state.bytes().begin(), drive.rig.state.bytes().end());
+    const std::vector<double> values = drive.rig.outputs.value;
+    observe(drive.rig.model, drive.rig.operators, drive.rig.state, drive.rig.inputs, drive.rig.outputs,
+            drive.rig.scratch);
+    EXPECT_EQ(std::memcmp(before.data(), drive.rig.state.bytes().data(), before.size()), 0);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const std::string& name = drive.rig.model.outputs()[i].name;
+        if (name.rfind("certificate.", 0) == 0) continue;
+        EXPECT_NEAR(drive.rig.outputs.value[i], values[i], 1e-6 * (1 + std::fabs(values[i]))) << name;
+    }
+}
+
+TEST(Kernels, AgreeWithThePortableOneToRounding) {
+    for (const KernelKind kind : {KernelKind::avx2, KernelKind::avx512}) {
+        try {
+            Drive portable, other({1e-3, kind});
+            for (int n = 0; n < drive_steps; ++n) {
+                portable.step();
+                other.step();
+            }
+            for (std::size_t j = 0; j < portable.rig.state.speeds().size(); ++j) {
+                // Events branch on rounding, so errors may grow; engine speed is of the order of 100 rad/s.
+                EXPECT_NEAR(portable.rig.state.speeds()[j], other.rig.state.speeds()[j], 1e-7);
+            }
+        } catch (const ModelError&) {
+            GTEST_SKIP() << "this processor does not run every kernel";
+        }
+    }
+}
+
+TEST(Ledger, ClosesInEveryStepOfAShiftAndAStop) {
+    Drive drive;
+    double worst = 0;
+    for (int n = 0; n < drive_steps; ++n) {
+        drive.step();
+        worst = std::max(worst, std::fabs(drive.rig.outputs.certificate.energy_defect));
+    }
+    EXPECT_LT(worst, 0.2);                                     // [J] of tens of kilojoules
+    EXPECT_LT(std::fabs(drive.rig.out("energy.defect")), 0.5);
+    EXPECT_GT(drive.rig.out("energy.dissipated"), 1e5);
+}
+
+TEST(Constraints, DoNotDriftInAMillionSteps) {
+    Description d;
+    d.name = "locked train";
+    d.masses = {mass("engine", 2, 188), mass("pinion", 0.02), mass("sun", 0.1), mass("ring", 0.3), mass("out", 4)};
+    Gear g;
+    g.name = "g", g.a = "pinion", g.b = "sun", g.ratio = -1.37, g.efficiency = 0.97;
+    Planetary p;
+    p.name = "p", p.sun = "sun", p.ring = "ring", p.carrier = "out", p.ratio = -2.4, p.efficiency = 0.97;
+    d.gears = {g};
+    d.planetaries = {p};
+    d.clutches = {clutch("c", "engine", "pinion", 500), clutch("b", "ring", "", 500)};
+    d.clutches[0].initially_locked = d.clutches[1].initially_locked = true;
+    d.sources = {source("engine", sine(40, 3)), source("out", constant(0))};
+    Rig rig(d);
+    double worst = 0;
+    for (int n = 0; n < 1000000; ++n) {
+        plant::step(rig.model, rig.operators, rig.state, rig.inputs, rig.outputs, rig.scratch);
+        worst = std::max(worst, rig.outputs.certificate.constraint_violation);
+    }
+    EXPECT_LT(worst, 1e-12);
+}
+
+}  // namespace
+}  // namespace shiftrig::plant
