@@ -1,7 +1,10 @@
 // shiftrig check: what a machine is, and what is wrong with it.
+#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "analysis/driveline_dot.h"
+#include "analysis/driveline_svg.h"
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/examination.h"
 #include "io/model_file.h"
@@ -11,9 +14,14 @@ namespace shiftrig::cli {
 namespace {
 
 struct Options {
-    std::string model, schema;
+    std::string model, schema, dot, svg;
     bool json = false, shapes = false;
 };
+
+void write(const std::string& path, const std::string& text) {
+    std::ofstream file(path);
+    if (!(file << text << std::flush)) throw io::InputError(path, 0, 0, "cannot be written");
+}
 
 int run(const Options& options) {
     if (!options.schema.empty()) {
@@ -21,7 +29,10 @@ int run(const Options& options) {
         return good;
     }
     if (options.model.empty()) throw CLI::RequiredError("MODEL");
-    const Examination examination = examine(io::read_model(options.model));
+    const io::ModelFile file = io::read_model(options.model);
+    const Examination examination = examine(file);
+    if (!options.dot.empty()) write(options.dot, analysis::driveline_dot(file.description));
+    if (!options.svg.empty()) write(options.svg, analysis::driveline_svg(file.description, true));
     if (options.json)
         std::cout << as_json(examination).dump(2) << '\n';
     else
@@ -34,6 +45,8 @@ Command::Run declare_check(CLI::App& app) {
     app.add_option("MODEL", options->model, "model file (YAML)");
     app.add_flag("--json", options->json, "print one JSON object");
     app.add_flag("--shapes", options->shapes, "print the mode shapes of every gear");
+    app.add_option("--dot", options->dot, "write the driveline as Graphviz text into this file");
+    app.add_option("--svg", options->svg, "draw the driveline and its gear table into this file");
     app.add_option("--schema", options->schema, "print the JSON Schema of model or scenario files")
         ->check(CLI::IsMember({"model", "scenario"}));
     return [options] { return run(*options); };

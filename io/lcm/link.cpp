@@ -492,6 +492,12 @@ bool LcmLink::question_pending() const SHIFTRIG_REALTIME {
 }
 
 bool LcmLink::wait(std::int64_t timeout_ns) noexcept {
+    constexpr std::int64_t patience_ns = 100'000'000;
+    while (timeout_ns > patience_ns) {
+        if (data_->endpoint->wait(patience_ns)) return true;
+        timeout_ns -= patience_ns;
+        if (data_->options.lockstep && awaiting_answer()) repeat_question();
+    }
     return data_->endpoint->wait(timeout_ns);
 }
 

@@ -60,14 +60,16 @@ class LcmLink {
     bool command_valid() const SHIFTRIG_REALTIME;
     // rig, lockstep: true from sending speeds_t until a clutch_command_t that answers it was received.
     bool awaiting_answer() const SHIFTRIG_REALTIME;
-    // rig, lockstep: says plant_info_t and the last speeds_t again, with their old seq: for a controller that
-    // came late, and against a lost question or answer (the controller then repeats its answer, and neither
-    // side counts anything twice). Call it while waiting, every 100 ms or so.
-    void repeat_question() noexcept;
     // controller: a speeds_t has come that no clutch_command_t of ours has answered; send() answers it.
     bool question_pending() const SHIFTRIG_REALTIME;
-    // Blocks until something can be received; false: nothing within `timeout_ns` of wall time.
+    // Blocks until something can be received; false: nothing within `timeout_ns` of wall time. A rig in
+    // lockstep repeats its question every 100 ms meanwhile.
     bool wait(std::int64_t timeout_ns) noexcept;
+
+    // rig, lockstep: says plant_info_t and the last speeds_t again, with their old seq: for a controller that
+    // came late, and against a lost question or answer (the controller then repeats its answer, and neither
+    // side counts anything twice).
+    void repeat_question() noexcept;
 
     // controller: simulated time of the newest speeds_t [ns].
     std::int64_t rig_time_ns() const SHIFTRIG_REALTIME;

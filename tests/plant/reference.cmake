@@ -7,3 +7,10 @@ add_executable(reference_solver_test plant/reference/solver_test.cpp)
 target_link_libraries(reference_solver_test PRIVATE shiftrig_reference GTest::gtest_main)
 target_compile_definitions(reference_solver_test PRIVATE SHIFTRIG_DATA="${CMAKE_SOURCE_DIR}/tests/data")
 gtest_discover_tests(reference_solver_test)
+
+add_library(shiftrig_comparison STATIC plant/random_systems.cpp plant/comparison.cpp)
+target_link_libraries(shiftrig_comparison PUBLIC shiftrig_reference shiftrig_plant)
+
+# Thousands by hand: shiftrig_random_systems --count 10000 --seed 1 --seconds 0.2 --jobs 2
+add_executable(shiftrig_random_systems plant/random_systems_main.cpp)
+target_link_libraries(shiftrig_random_systems PRIVATE shiftrig_comparison Threads::Threads)

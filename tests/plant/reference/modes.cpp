@@ -28,12 +28,16 @@ Matrix least_cost_solution(const Matrix& k, const Matrix& right, const Vector& c
 }  // namespace
 
 const Response& Responses::of(const Mode& mode) {
+    if (last_ && mode == last_mode_) return *last_;
     std::vector<int> key;
     for (const Hold h : mode.friction) key.push_back(h == Hold::held);
     for (std::size_t m = 0; m < mode.mesh.size(); ++m)
         key.push_back(!system_.meshes[m].lossy() ? 0 : mode.mesh[m] == Hold::held ? 0 : mode.x[m]);
-    const auto found = cache_.find(key);
-    return found != cache_.end() ? found->second : cache_.emplace(key, build(mode)).first->second;
+    auto found = cache_.find(key);
+    if (found == cache_.end()) found = cache_.emplace(key, build(mode)).first;
+    last_mode_ = mode;
+    last_ = &found->second;
+    return *last_;
 }
 
 Response Responses::build(const Mode& mode) const {

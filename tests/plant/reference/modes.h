@@ -34,7 +34,8 @@ struct Response {
     Matrix friction_torque;  // T of held devices, zero rows for the others
     Matrix projector;        // J-orthogonal projector of speeds onto the constraints
     int redundancy = 0;      // dependent rows among meshes and held friction devices
-    bool sound = true;       // held meshes are independent of everything else that is held
+    bool sound =
+        true;  // held meshes are independent of everything else that is held: their loss torque is unique
 };
 
 class Responses {
@@ -46,6 +47,8 @@ class Responses {
     Response build(const Mode& mode) const;
     const System& system_;
     std::map<std::vector<int>, Response> cache_;
+    Mode last_mode_;
+    const Response* last_ = nullptr;
 };
 
 }  // namespace shiftrig::reference

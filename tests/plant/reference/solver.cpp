@@ -86,7 +86,6 @@ double Solver::acceleration_tolerance(const Vector& column, const Torques& torqu
 
 bool Solver::consistent(const Mode& trial, const Torques& torques) {
     const double torque_tolerance = 1e-9 * (torques.free.lpNorm<Eigen::Infinity>() + 1e-6);
-    if (!responses_.of(trial).sound) return false;
     for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
         const auto& mesh = system_.meshes[m];
         const auto i = static_cast<Eigen::Index>(m);
@@ -359,7 +358,10 @@ Sample Solver::sample(When when) {
         if (system_.meshes[m].lossy())
             s.loss_torque[static_cast<Eigen::Index>(m)] +=
                 sign_of(mode.mesh[m]) * system_.meshes[m].offset(mode.x[m]);
-    s.unique = responses_.of(mode).redundancy == 0;
+    s.input = energy_.input;
+    s.dissipated = energy_.dissipated;
+    s.stored = stored_energy();
+    s.unique = responses_.of(mode).redundancy == 0 && responses_.of(mode).sound;
     for (std::size_t m = 0; m < system_.meshes.size(); ++m)
         if (mode.at_rest[m] && mode.mesh[m] != Hold::held) s.unique = false;
     return s;
@@ -367,14 +369,60 @@ Sample Solver::sample(When when) {
 
 // ---- the run --------------------------------------------------------------------------------------------
 
-void Solver::rk4(double t, double inside, double h, Vector& out) {
-    rates({t, inside}, z, k1_);
+Solver::Energy Solver::power(When when, const Vector& state, const Vector& force) {
+    const auto omega = state.head(system_.masses);
+    Energy p;
+    for (std::size_t i = 0; i < system_.sources.size(); ++i) {
+        const auto& source = system_.sources[i];
+        const double w = omega[system_.source_mass[i]];
+        p.input += w * (evaluate(source.waveform, when) - source.quadratic * w * std::abs(w));
+    }
+    p.dissipated = omega.dot(system_.damper * omega);
+    for (int e = 0; e < system_.shafts; ++e) {
+        const double rate = system_.shaft_columns.col(e).dot(omega);
+        p.dissipated += system_.damping[e] * rate * rate;
+    }
+    for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
+        const double s = sign_of(mode.friction[f]);
+        if (s == 0) continue;
+        const double slip = system_.frictions[f].column.dot(omega);
+        p.dissipated += s * slip * system_.frictions[f].sliding(when, state, slip);
+    }
+    const Response* response = nullptr;
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
+        const auto& mesh = system_.meshes[m];
+        if (!mesh.lossy() || mode.mesh[m] == Hold::held) continue;
+        if (!response) response = &responses_.of(mode);
+        const double loss = response->loss_torque.row(static_cast<Eigen::Index>(m)).dot(force) +
+                            sign_of(mode.mesh[m]) * mesh.offset(mode.x[m]);
+        p.dissipated += loss * mesh.relative.dot(omega);
+    }
+    return p;
+}
+
+double Solver::stored_energy() const {
+    const auto omega = z.head(system_.masses);
+    const auto twist = z.segment(system_.masses, system_.shafts);
+    return 0.5 * omega.dot(system_.inertia.cwiseProduct(omega)) +
+           0.5 * twist.dot(system_.stiffness.cwiseProduct(twist));
+}
+
+void Solver::rk4(double t, double inside, double h, Vector& out, Energy& energy) {
+    const double weight[] = {h / 6, h / 3, h / 3, h / 6};
+    energy = energy_;
+    const auto stage = [&](int i, double time, const Vector& state, Vector& k) {
+        rates({time, inside}, state, k);
+        const Energy p = power({time, inside}, state, force_);
+        energy.input += weight[i] * p.input;
+        energy.dissipated += weight[i] * p.dissipated;
+    };
+    stage(0, t, z, k1_);
     stage_ = z + h / 2 * k1_;
-    rates({t + h / 2, inside}, stage_, k2_);
+    stage(1, t + h / 2, stage_, k2_);
     stage_ = z + h / 2 * k2_;
-    rates({t + h / 2, inside}, stage_, k3_);
+    stage(2, t + h / 2, stage_, k3_);
     stage_ = z + h * k3_;
-    rates({t + h, inside}, stage_, k4_);
+    stage(3, t + h, stage_, k4_);
     out = z + h / 6 * (k1_ + 2 * k2_ + 2 * k3_ + k4_);
 }
 
@@ -398,6 +446,7 @@ Result Solver::run(double until, const Options& options) {
     double t = 0;
     bool first = true;
     Vector end;
+    Energy energy;
     int events = 0;
     while (next_grid <= grid_points && !result.gave_up) {
         double stop = static_cast<double>(next_grid) * options.grid;
@@ -418,16 +467,17 @@ Result Solver::run(double until, const Options& options) {
             double begin_time = from + static_cast<double>(i) * h;
             double left = h;
             for (;;) {
-                rk4(begin_time, inside, left, end);
+                rk4(begin_time, inside, left, end, energy);
                 if (!violated({begin_time + left, inside}, end)) break;
                 double low = 0, high = 1;
                 for (int k = 0; k < 45; ++k) {
                     const double middle = (low + high) / 2;
-                    rk4(begin_time, inside, middle * left, end);
+                    rk4(begin_time, inside, middle * left, end, energy);
                     (violated({begin_time + middle * left, inside}, end) ? high : low) = middle;
                 }
-                rk4(begin_time, inside, high * left, end);
+                rk4(begin_time, inside, high * left, end, energy);
                 z = end;
+                energy_ = energy;
                 begin_time += high * left;
                 left *= 1 - high;
                 apply_violations({begin_time, inside});
@@ -437,6 +487,7 @@ Result Solver::run(double until, const Options& options) {
                 }
             }
             z = end;
+            energy_ = energy;
             if (!z.allFinite()) result.gave_up = true;
         }
         t = stop;

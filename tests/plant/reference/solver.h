@@ -13,7 +13,7 @@ struct Options {
     double step = 5e-6;        // largest step [s]; refined where the machine is stiffer
     double resolution = 0.05;  // step·(fastest rate) stays below this
     double grid = 1e-3;        // [s] of the samples
-    int event_limit = 20000;   // beyond it the run is given up as chattering
+    int event_limit = 2000;   // beyond it the run is given up as chattering
 };
 
 struct Change {
@@ -27,7 +27,8 @@ struct Sample {
     Vector z;
     Vector friction_torque, mesh_torque, loss_torque;
     Mode mode;
-    bool unique = true;  // the torque split is
+    bool unique = true;                            // the torque split is
+    double input = 0, dissipated = 0, stored = 0;  // [J], the first two since the start
 };
 
 struct Result {
@@ -73,12 +74,20 @@ class Solver {
     void note(double time, const std::string& device, const char* what);
     double acceleration_tolerance(const Vector& column, const Torques& torques) const;
     double speed_scale() const;
-    void rk4(double t, double inside, double h, Vector& out);
+    struct Energy {
+        double input = 0, dissipated = 0;
+    };
+    void rk4(double t, double inside, double h, Vector& out, Energy& energy);
+    // Power of the sources, and power lost in dampers, slipping pairs and meshes, at (when, state); force_
+    // must hold M̃ of the same instant.
+    Energy power(When when, const Vector& state, const Vector& force);
+    double stored_energy() const;
     double fastest_rate();
 
     const System& system_;
     Responses responses_;
     Torques work_;
+    Energy energy_;
     Vector force_, extra_, k1_, k2_, k3_, k4_, stage_, margins_;
 };
 

@@ -142,6 +142,22 @@ TEST(ReferenceSolver, SharesParallelClutchesByCapacity) {
     EXPECT_FALSE(result.samples.back().unique);
 }
 
+// What goes in is stored or lost, with slipping pairs, a spring, a lossy mesh and every change of state.
+TEST(ReferenceSolver, BooksEveryJoule) {
+    const std::pair<plant::Description, double> machines[] = {{cases::coupled_clutches(), 1.5},
+                                                              {cases::lossy_gear_demo(), 0.5},
+                                                              {cases::friction(), 3.0},
+                                                              {cases::light_body(), 3.0}};
+    for (const auto& [description, until] : machines) {
+        const Result result = run(description, until, {.step = 1e-5});
+        const Sample &first = result.samples.front(), &last = result.samples.back();
+        EXPECT_NEAR(last.stored - first.stored, last.input - last.dissipated,
+                    1e-9 * (last.dissipated + first.stored))
+            << description.name;
+        EXPECT_GT(last.dissipated, 0.01) << description.name;
+    }
+}
+
 TEST(ReferenceSolver, ConvergesOnTheLightBody) {
     const Result coarse = run(cases::light_body(), 3.0, {.step = 1e-5});
     const Result fine = run(cases::light_body(), 3.0, {.step = 4e-6});

@@ -1,0 +1,326 @@
+#include "tests/plant/comparison.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <random>
+
+#include "plant/plant.h"
+
+namespace shiftrig {
+namespace {
+
+using namespace plant;
+using reference::Result;
+using reference::Sample;
+
+// The signals of a run, one row per grid point: speeds, twists, clutch torques, mesh torques.
+struct Table {
+    std::vector<std::string> names;
+    int smooth = 0;  // the first so many are continuous
+    std::vector<int> unit;
+    std::vector<std::vector<double>> rows;
+    std::vector<bool> unique;
+    std::vector<double> change_times;
+};
+
+Table table_of(const Description& d, const Result& result) {
+    Table t;
+    for (const auto& m : d.masses) t.names.push_back("mass." + m.name + ".speed");
+    for (const auto& s : d.shafts) t.names.push_back("shaft." + s.name + ".twist");
+    t.unit.assign(d.masses.size(), 0);
+    t.unit.resize(t.names.size(), 1);
+    t.smooth = static_cast<int>(t.names.size());
+    for (const auto& c : d.clutches) t.names.push_back("clutch." + c.name + ".torque");
+    for (const auto& g : d.gears) t.names.push_back("gear." + g.name + ".torque");
+    for (const auto& r : d.planetaries) t.names.push_back("row." + r.name + ".sun");
+    t.unit.resize(t.names.size(), 2);
+    for (const Sample& s : result.samples) {
+        std::vector<double> row(s.z.data(), s.z.data() + t.smooth);
+        row.insert(row.end(), s.friction_torque.data(), s.friction_torque.data() + s.friction_torque.size());
+        row.insert(row.end(), s.mesh_torque.data(), s.mesh_torque.data() + s.mesh_torque.size());
+        t.rows.push_back(row);
+        t.unique.push_back(s.unique);
+    }
+    for (const auto& change : result.changes) t.change_times.push_back(change.time);
+    return t;
+}
+
+Deviation deviation(const Table& truth, const Table& other, const ComparisonOptions& options) {
+    const std::size_t signals = truth.names.size();
+    std::vector<double> low(signals, 1e300), high(signals, -1e300);
+    for (const auto& row : truth.rows)
+        for (std::size_t i = 0; i < signals; ++i) {
+            low[i] = std::min(low[i], row[i]);
+            high[i] = std::max(high[i], row[i]);
+        }
+    double largest[3] = {0, 0, 0};
+    for (std::size_t i = 0; i < signals; ++i) {
+        double& of_unit = largest[truth.unit[i]];
+        of_unit = std::max(of_unit, high[i] - low[i]);
+    }
+    Deviation d;
+    const std::size_t rows = std::min(truth.rows.size(), other.rows.size());
+    for (std::size_t k = 0; k < rows; ++k) {
+        const double time = static_cast<double>(k) * 1e-3;
+        bool settled = truth.unique[k] && k > 0;
+        for (const auto* changes : {&truth.change_times, &other.change_times})
+            for (const double change : *changes)
+                settled = settled && std::abs(change - time) > options.event_clearance;
+        for (std::size_t i = 0; i < signals; ++i) {
+            const bool smooth = static_cast<int>(i) < truth.smooth;
+            if (!smooth && !settled) continue;
+            const double range = std::max(high[i] - low[i], options.range_floor * largest[truth.unit[i]]);
+            const double difference = std::abs(truth.rows[k][i] - other.rows[k][i]);
+            double ratio = difference / (options.tolerance * range + 1e-12);
+            if (!std::isfinite(ratio)) ratio = 1e300;
+            if (smooth) d.worst_speed = std::max(d.worst_speed, ratio);
+            if (ratio <= d.worst) continue;
+            d.worst = ratio;
+            d.signal = truth.names[i];
+            d.time = time;
+        }
+    }
+    return d;
+}
+
+std::string text(const char* format, auto... values) {
+    char buffer[400];
+    std::snprintf(buffer, sizeof buffer, format, values...);
+    return buffer;
+}
+
+// The plant's run of the same machine, with every invariant that must hold on the way.
+struct PlantRun {
+    Table table;
+    std::vector<std::string> broken;
+    int fall_backs = 0, events = 0;
+    double input = 0, stored = 0, dissipated = 0, worst_defect = 0;
+    std::vector<double> final_speeds;
+};
+
+double violation_of(const Description& d, const Model& model, const Outputs& outputs) {
+    const auto speed = [&](const std::string& mass) {
+        return outputs.value[static_cast<std::size_t>(model.output("mass." + mass + ".speed"))];
+    };
+    double worst = 0;
+    for (const auto& g : d.gears) worst = std::max(worst, std::abs(speed(g.a) - g.ratio * speed(g.b)));
+    for (const auto& r : d.planetaries)
+        worst = std::max(worst,
+                         std::abs(speed(r.sun) - r.ratio * speed(r.ring) - (1 - r.ratio) * speed(r.carrier)));
+    for (const auto& c : d.clutches)
+        if (outputs.value[static_cast<std::size_t>(model.output("clutch." + c.name + ".state"))] == 0)
+            worst = std::max(worst, std::abs(speed(c.a) - (c.b.empty() ? 0.0 : speed(c.b))));
+    return worst;
+}
+
+PlantRun run_plant(const Description& d, const Table& layout, std::uint64_t seed, double seconds) {
+    const Model model = Model::build(d, {.step_size = 1e-3, .kernel = KernelKind::automatic});
+    Operators operators(model), twin_operators(model);
+    State state(model), twin(model);
+    Scratch scratch(model), twin_scratch(model);
+    const Inputs inputs(model);
+    Outputs outputs(model), twin_outputs(model);
+    std::vector<std::size_t> column;
+    for (const auto& name : layout.names) column.push_back(static_cast<std::size_t>(model.output(name)));
+    const auto output = [&](const char* name) {
+        return outputs.value[static_cast<std::size_t>(model.output(name))];
+    };
+
+    PlantRun run;
+    run.table.names = layout.names;
+    run.table.smooth = layout.smooth;
+    const auto record = [&] {
+        std::vector<double> row;
+        for (const std::size_t c : column) row.push_back(outputs.value[c]);
+        run.table.rows.push_back(row);
+    };
+    observe(model, operators, state, inputs, outputs, scratch);
+    record();
+    std::mt19937_64 coin(seed);
+    double violation = 0, fastest = 1;
+    bool finite = true, same = true, flagged = true;
+    const double stored_at_start = output("energy.stored");
+    double moved = stored_at_start;
+    const int steps = static_cast<int>(std::lround(seconds / 1e-3));
+    for (int k = 0; k < steps; ++k) {
+        step(model, operators, state, inputs, outputs, scratch);
+        // The same from forgotten operators and a scratch full of NaN: not a bit may differ.
+        if (coin() % 4 == 0) twin_operators.drop();
+        twin_scratch.fill_with_nan();
+        step(model, twin_operators, twin, inputs, twin_outputs, twin_scratch);
+        same = same && std::memcmp(state.bytes().data(), twin.bytes().data(), state.bytes().size()) == 0;
+        record();
+        for (const double v : run.table.rows.back()) finite = finite && std::isfinite(v);
+        for (const auto& m : d.masses)
+            fastest = std::max(
+                fastest,
+                std::abs(outputs.value[static_cast<std::size_t>(model.output("mass." + m.name + ".speed"))]));
+        violation = std::max(violation, violation_of(d, model, outputs));
+        run.fall_backs += outputs.certificate.fall_backs;
+        run.events += outputs.certificate.events;
+        flagged = flagged && outputs.certificate.fall_backs >= 0;
+        for (int e = 0; e < std::min(outputs.event_count, Outputs::event_capacity); ++e)
+            run.table.change_times.push_back(outputs.events[static_cast<std::size_t>(e)].time);
+        moved = std::max(moved, stored_at_start + std::abs(output("energy.dissipated")));
+        run.worst_defect = std::max(run.worst_defect, std::abs(output("energy.defect")));
+    }
+    run.table.unique.assign(run.table.rows.size(), true);
+    run.input = output("energy.input");
+    run.stored = output("energy.stored");
+    run.dissipated = output("energy.dissipated");
+    run.worst_defect /= std::max(moved, 1e-9);
+    if (!finite) run.broken.push_back("a signal is not finite");
+    if (!same) run.broken.push_back("a run with forgotten operators differs in its bits");
+    if (violation > 1e-10 * fastest)
+        run.broken.push_back(text("constraint violated by %.3g rad/s", violation));
+    const double defect = run.stored - stored_at_start - run.input + run.dissipated;
+    if (!(std::abs(defect) <= 1e-4 * moved + 1e-9))
+        run.broken.push_back(text("ledger open by %.3g of %.3g J", defect, moved));
+    return run;
+}
+
+}  // namespace
+
+const char* name(Outcome outcome) {
+    switch (outcome) {
+        case Outcome::agrees:
+            return "agrees";
+        case Outcome::sensitive:
+            return "sensitive";
+        case Outcome::reference_failed:
+            return "reference failed";
+        case Outcome::disagrees:
+            return "disagrees";
+        case Outcome::broken:
+            return "broken";
+    }
+    return "";
+}
+
+Deviation deviation(const Description& description, const Result& truth, const Result& other,
+                    const ComparisonOptions& options) {
+    return deviation(table_of(description, truth), table_of(description, other), options);
+}
+
+Result run_reference(const Description& description, const ComparisonOptions& options) {
+    const reference::System system(description);
+    reference::Solver solver(system);
+    return solver.run(options.seconds, {.step = 1e-5});
+}
+
+Description perturbed(Description d, double relative, std::uint64_t seed) {
+    std::mt19937_64 engine(seed);
+    const auto factor = [&] { return 1 + relative * (engine() % 2 == 0 ? 1 : -1); };
+    for (auto& m : d.masses) m.initial_speed *= factor();
+    for (auto& c : d.clutches) std::get<DryFriction>(c.friction).sliding_capacity *= factor();
+    for (auto& s : d.sources) {
+        const double f = factor();
+        for (auto& p : s.waveform.pieces) {
+            p.offset *= f;
+            p.slope *= f;
+            p.amplitude *= f;
+        }
+    }
+    return d;
+}
+
+Comparison compare(const RandomSystem& system, std::uint64_t seed, const ComparisonOptions& options) {
+    const Description& d = system.description;
+    Comparison result;
+    const auto clock = [] {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+    };
+    const double begin = clock();
+    const Result truth = run_reference(d, options);
+    result.seconds_reference = clock() - begin;
+    const Table layout = table_of(d, truth);
+    const PlantRun run = run_plant(d, layout, seed, options.seconds);
+    result.broken = run.broken;
+    result.fall_backs = run.fall_backs;
+    result.events = run.events;
+    result.energy_defect = run.worst_defect;
+    if (system.momentum_is_conserved) {
+        double now = 0, start = 0, given = 0, scale = 1e-9;
+        for (std::size_t i = 0; i < d.masses.size(); ++i) {
+            now += d.masses[i].inertia * run.table.rows.back()[i];
+            start += d.masses[i].inertia * run.table.rows.front()[i];
+            scale += d.masses[i].inertia * std::abs(run.table.rows.back()[i]);
+        }
+        for (const auto& s : d.sources) given += impulse(s.waveform, options.seconds);
+        if (std::abs(now - start - given) > 1e-8 * (scale + std::abs(given)))
+            result.broken.push_back(text("momentum off by %.3g of %.3g Nms", now - start - given, scale));
+    }
+    const bool reference_sound = !truth.gave_up && truth.unresolved == 0;
+    if (reference_sound) {
+        const Deviation difference = deviation(layout, run.table, options);
+        result.worst = difference.worst;
+        result.worst_speed = difference.worst_speed;
+        result.worst_signal = difference.signal;
+        result.worst_time = difference.time;
+    }
+    const auto moves = [&](std::uint64_t which) {
+        const Result other = run_reference(perturbed(d, options.perturbation, which), options);
+        return other.gave_up || deviation(layout, table_of(d, other), options).worst_speed > 1;
+    };
+    if (!result.broken.empty())
+        result.outcome = Outcome::broken;
+    else if (!reference_sound)
+        result.outcome = Outcome::reference_failed;
+    else if (moves(seed + 1))
+        result.outcome = Outcome::sensitive;
+    else if (result.worst > 1)
+        result.outcome = Outcome::disagrees;
+    return result;
+}
+
+namespace {
+
+std::string text_of(const Waveform& w) {
+    std::string s;
+    for (const auto& p : w.pieces) {
+        s += " [";
+        if (p.from > 0) s += text("from %g ", p.from);
+        if (p.until < 1e9) s += text("until %g ", p.until);
+        s += text("%g", p.offset);
+        if (p.slope != 0) s += text(" %+g/s", p.slope);
+        if (p.amplitude != 0) s += text(" %+g sin %g Hz at %g", p.amplitude, p.frequency, p.phase_time);
+        s += "]";
+    }
+    return s;
+}
+
+}  // namespace
+
+std::string describe(const Description& d) {
+    std::string s = d.name + "\n";
+    for (const auto& m : d.masses)
+        s += text("  mass %s J=%.6g w0=%.8g\n", m.name.c_str(), m.inertia, m.initial_speed);
+    for (const auto& e : d.shafts)
+        s += text("  shaft %s %s-%s k=%.6g d=%.6g twist0=%.6g\n", e.name.c_str(), e.a.c_str(), e.b.c_str(),
+                  e.stiffness, e.damping, e.initial_twist);
+    for (const auto& k : d.dampers)
+        s += text("  damper %s %s-%s d=%.6g\n", k.name.c_str(), k.a.c_str(), k.b.c_str(), k.damping);
+    for (const auto& c : d.clutches) {
+        const auto& law = std::get<DryFriction>(c.friction);
+        s += text("  clutch %s %s-%s %.6g Nm static x%.4g falling %.3g over %.4g rad/s%s", c.name.c_str(),
+                  c.a.c_str(), c.b.c_str(), law.sliding_capacity, law.static_ratio, law.falling,
+                  law.falling_speed, c.initially_locked ? " locked" : "");
+        if (const auto* direct = std::get_if<ActuationDirect>(&c.actuation)) s += text_of(direct->profile);
+        s += "\n";
+    }
+    for (const auto& g : d.gears)
+        s += text("  gear %s %s-%s u=%.6g eta=%.6g bearing=%.4g\n", g.name.c_str(), g.a.c_str(), g.b.c_str(),
+                  g.ratio, g.efficiency, g.bearing_torque);
+    for (const auto& r : d.planetaries)
+        s += text("  row %s sun %s ring %s carrier %s u=%.6g eta=%.6g\n", r.name.c_str(), r.sun.c_str(),
+                  r.ring.c_str(), r.carrier.c_str(), r.ratio, r.efficiency);
+    for (const auto& t : d.sources)
+        s += text("  source %s on %s%s quadratic %.4g\n", t.name.c_str(), t.mass.c_str(),
+                  text_of(t.waveform).c_str(), t.quadratic);
+    return s;
+}
+
+}  // namespace shiftrig

@@ -1,0 +1,356 @@
+#include "tests/plant/random_systems.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+namespace shiftrig {
+namespace {
+
+using namespace plant;
+
+// Draws by hand: the distributions of the standard library differ between implementations.
+class Dice {
+  public:
+    explicit Dice(std::uint64_t seed) : engine_(seed * 0x9E3779B97F4A7C15ull + 1) { engine_.discard(8); }
+    double uniform(double low, double high) {
+        return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1.0p-53;
+    }
+    double logarithmic(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
+    int integer(int low, int high) { return low + static_cast<int>(uniform(0, 1) * (high - low + 1)); }
+    bool chance(double probability) { return uniform(0, 1) < probability; }
+
+  private:
+    std::mt19937_64 engine_;
+};
+
+class Builder {
+  public:
+    Builder(std::uint64_t seed, double seconds) : dice_(seed), seconds_(seconds) {
+        system_.description.name = "random " + std::to_string(seed);
+    }
+
+    RandomSystem build() {
+        torque_level_ = dice_.logarithmic(5, 200);
+        many_clutch_paths_ = dice_.chance(0.35);
+        for (int i = dice_.integer(1, 3); i > 0; --i) instants_.push_back(instant());
+        grow();
+        close_loops();
+        ground();
+        drive();
+        set_in_motion();
+        system_.momentum_is_conserved = !grounded_ && d().gears.empty() && d().planetaries.empty();
+        system_.traits = "n=" + std::to_string(d().masses.size()) + system_.traits;
+        return std::move(system_);
+    }
+
+  private:
+    Description& d() { return system_.description; }
+    std::string name(const char* kind) { return kind + std::to_string(++count_); }
+    void trait(const char* word) { system_.traits += std::string(" ") + word; }
+    double instant() { return 1e-3 * dice_.integer(5, static_cast<int>(seconds_ * 900)); }
+    double inertia(const std::string& mass_name) {
+        for (const auto& m : d().masses)
+            if (m.name == mass_name) return m.inertia;
+        return 0;
+    }
+
+    std::string add_mass() {
+        double j = dice_.logarithmic(0.03, 3);
+        if (dice_.chance(0.08)) {
+            j = dice_.logarithmic(1e-4, 1e-3);
+            trait("light");
+        } else if (dice_.chance(0.08)) {
+            j = dice_.logarithmic(10, 100);
+            trait("heavy");
+        }
+        d().masses.push_back({.name = name("m"), .inertia = j});
+        return d().masses.back().name;
+    }
+    std::string any_mass() {
+        return d()
+            .masses[static_cast<std::size_t>(dice_.integer(0, static_cast<int>(d().masses.size()) - 1))]
+            .name;
+    }
+
+    void add_shaft(const std::string& a, const std::string& b) {
+        const double j = std::min(inertia(a), inertia(b));
+        const bool stiff = dice_.chance(0.15);
+        const double omega =
+            2 * std::numbers::pi * (stiff ? dice_.logarithmic(200, 1500) : dice_.logarithmic(2, 100));
+        const double damping_ratio = stiff ? dice_.logarithmic(0.05, 1) : dice_.logarithmic(0.003, 0.3);
+        if (stiff) trait("stiff");
+        Shaft shaft{.name = name("s"), .a = a, .b = b};
+        shaft.stiffness = j * omega * omega;
+        shaft.damping = 2 * damping_ratio * j * omega;
+        shaft.initial_twist =
+            dice_.chance(0.3) ? dice_.uniform(-0.5, 0.5) * torque_level_ / shaft.stiffness : 0;
+        d().shafts.push_back(shaft);
+    }
+
+    // 0…1 over the run: always on, or jumps, ramps and waves that begin and end on whole milliseconds.
+    Waveform engagement() {
+        Waveform w;
+        const double a = dice_.uniform(0.3, 1), b = dice_.uniform(0.3, 1);
+        const double t1 = dice_.chance(0.7) ? instants_[static_cast<std::size_t>(
+                                                  dice_.integer(0, static_cast<int>(instants_.size()) - 1))]
+                                            : instant();
+        const double t2 = t1 + 1e-3 * dice_.integer(2, 60);
+        switch (dice_.integer(0, 6)) {
+            case 0:
+                w.pieces = {{.from = t1, .offset = a}};
+                break;  // closes
+            case 1:
+                w.pieces = {{.until = t1, .offset = a}};
+                break;  // opens
+            case 2:
+                w.pieces = {{.until = t1, .offset = a}, {.from = t2, .offset = b}};
+                break;  // opens, closes
+            case 3:
+                w.pieces = {{.from = t1, .until = t2, .slope = a / (t2 - t1)}, {.from = t2, .offset = a}};
+                break;
+            case 4:
+                w.pieces = {{.until = t1, .offset = a},
+                            {.from = t1, .until = t2, .offset = a, .slope = -a / (t2 - t1)}};
+                break;
+            case 5:
+                w.pieces = {{.until = t1, .offset = a}, {.from = t1, .offset = b}};
+                break;  // steps
+            default:
+                w.pieces = {{.offset = 0.5 * a,
+                             .amplitude = 0.5 * b,
+                             .frequency = dice_.uniform(2, 15),
+                             .phase_time = dice_.uniform(0, 0.1)}};
+        }
+        return w;
+    }
+
+    Clutch& add_clutch(const std::string& a, const std::string& b) {
+        Clutch clutch;
+        clutch.name = name(b.empty() ? "b" : "c");
+        clutch.a = a;
+        clutch.b = b;
+        DryFriction law;
+        law.sliding_capacity = torque_level_ * dice_.logarithmic(0.3, 5);
+        // Where torque can take several closed ways at once, the instant of break-away would depend on how it
+        // is split; with equal static and sliding capacity the motion does not.
+        law.static_ratio = many_clutch_paths_ || dice_.chance(0.4) ? 1 : dice_.uniform(1, 1.4);
+        const double lightest = b.empty() ? inertia(a) : std::min(inertia(a), inertia(b));
+        if (dice_.chance(0.15)) {
+            // Falling friction drives slip apart at the rate slope/J, which no step longer than its inverse resolves.
+            law.falling = dice_.uniform(0.05, 0.3);
+            law.falling_speed = std::max(1.0, law.sliding_capacity * law.falling / (lightest * 150));
+            trait("falling");
+        }
+        clutch.friction = law;
+        if (dice_.chance(0.25))
+            clutch.actuation = ActuationConstant{};
+        else
+            clutch.actuation = ActuationDirect{.profile = engagement()};
+        d().clutches.push_back(clutch);
+        return d().clutches.back();
+    }
+
+    double efficiency(bool lossless) {
+        if (lossless || dice_.chance(0.4)) return 1;
+        trait("lossy");
+        return dice_.chance(0.8) ? dice_.uniform(0.9, 0.995) : dice_.uniform(0.6, 0.9);
+    }
+
+    void add_gear(const std::string& a, const std::string& b, double ratio) {
+        Gear gear;
+        gear.name = name("g");
+        gear.a = a;
+        gear.b = b;
+        gear.ratio = ratio;
+        gear.efficiency = efficiency(lossy_ >= 4);
+        if (gear.efficiency < 1 && dice_.chance(0.2)) {
+            gear.bearing_torque = torque_level_ * dice_.logarithmic(0.003, 0.05);
+            trait("bearing");
+        }
+        lossy_ += gear.efficiency < 1;
+        d().gears.push_back(gear);
+    }
+    double ratio() { return dice_.logarithmic(0.4, 2.5) * (dice_.chance(0.2) ? -1 : 1); }
+
+    void add_row() {
+        Planetary row;
+        row.name = name("r");
+        std::string links[] = {any_mass(), add_mass(), add_mass()};
+        for (int i = 2; i > 0; --i) std::swap(links[i], links[dice_.integer(0, i)]);
+        row.sun = links[0];
+        row.ring = links[1];
+        row.carrier = links[2];
+        row.ratio = -dice_.uniform(1.4, 3.5);
+        row.efficiency = efficiency(lossy_ >= 4);
+        lossy_ += row.efficiency < 1;
+        d().planetaries.push_back(row);
+        trait("row");
+    }
+
+    // Two clutches to two gears of different ratio on one output: any pair of gears of a powershift box.
+    void add_powershift() {
+        const std::string input = any_mass(), output = add_mass();
+        for (int i = 0; i < 2; ++i) {
+            const std::string pinion = add_mass();
+            add_clutch(input, pinion);
+            add_gear(pinion, output, dice_.logarithmic(0.5, 2));
+        }
+        trait("shift");
+    }
+
+    void grow() {
+        add_mass();
+        const auto target = static_cast<std::size_t>(dice_.integer(2, 8));
+        const bool plain = dice_.chance(0.2);  // no gears: momentum can be checked
+        while (d().masses.size() < target) {
+            const double kind = plain ? dice_.uniform(0, 0.65) : dice_.uniform(0, 1);
+            if (kind < 0.3) {
+                const std::string a = any_mass();
+                add_shaft(a, add_mass());
+            } else if (kind < 0.65) {
+                const std::string a = any_mass();
+                add_clutch(a, add_mass());
+            } else if (kind < 0.83) {
+                const std::string a = any_mass();
+                add_gear(a, add_mass(), ratio());
+            } else if (kind < 0.92) {
+                add_row();
+            } else {
+                add_powershift();
+            }
+        }
+    }
+
+    void close_loops() {
+        if (d().masses.size() < 3) return;
+        const auto pair = [this] {
+            std::string a = any_mass(), b = any_mass();
+            while (b == a) b = any_mass();
+            return std::pair{a, b};
+        };
+        if (dice_.chance(0.25)) {
+            const auto [a, b] = pair();
+            add_shaft(a, b);
+            trait("loop");
+        }
+        if (many_clutch_paths_) {
+            const auto [a, b] = pair();
+            add_clutch(a, b);
+            trait("clutch-loop");
+        }
+        if (dice_.chance(0.2)) {
+            const auto [a, b] = pair();
+            d().dampers.push_back(
+                {.name = name("k"), .a = a, .b = b, .damping = torque_level_ * dice_.logarithmic(1e-3, 0.1)});
+        }
+    }
+
+    void ground() {
+        if (dice_.chance(0.4)) return;
+        grounded_ = true;
+        const int brakes = many_clutch_paths_ ? dice_.integer(0, 2) : dice_.integer(0, 1);
+        for (int i = 0; i < brakes; ++i) add_clutch(any_mass(), "");
+        if (brakes > 0) trait("brake");
+        if (dice_.chance(0.3))
+            d().dampers.push_back({.name = name("k"),
+                                   .a = any_mass(),
+                                   .b = "",
+                                   .damping = torque_level_ * dice_.logarithmic(1e-4, 0.01)});
+    }
+
+    void drive() {
+        // A torque on a body that is both light and free would only race it.
+        std::vector<std::string> solid;
+        for (const auto& m : d().masses)
+            if (m.inertia > 0.02) solid.push_back(m.name);
+        if (solid.empty()) solid.push_back(d().masses[0].name);
+        for (int i = dice_.integer(1, 3); i > 0; --i) {
+            TorqueSource source;
+            source.name = name("t");
+            source.mass =
+                solid[static_cast<std::size_t>(dice_.integer(0, static_cast<int>(solid.size()) - 1))];
+            Waveform::Piece piece{.offset = torque_level_ * dice_.uniform(-1, 1)};
+            if (dice_.chance(0.4)) {
+                piece.amplitude = torque_level_ * dice_.uniform(0.2, 1);
+                piece.frequency = dice_.logarithmic(1, 20);
+            }
+            if (dice_.chance(0.3)) piece.from = instants_[0];
+            source.waveform.pieces = {piece};
+            if (grounded_ && dice_.chance(0.3)) source.quadratic = torque_level_ * 1e-4 * dice_.uniform(0, 1);
+            d().sources.push_back(source);
+        }
+    }
+
+    // Speeds that gears and rows allow, from rest in a quarter of the systems.
+    void set_in_motion() {
+        if (dice_.chance(0.25)) {
+            trait("rest");
+            return;
+        }
+        const auto n = static_cast<Eigen::Index>(d().masses.size());
+        const auto index = [this](const std::string& mass_name) {
+            Eigen::Index i = 0;
+            while (d().masses[static_cast<std::size_t>(i)].name != mass_name) ++i;
+            return i;
+        };
+        Eigen::VectorXd omega(n), j(n);
+        for (Eigen::Index i = 0; i < n; ++i) {
+            omega[i] = dice_.chance(0.2) ? 0 : dice_.uniform(-100, 100);
+            j[i] = d().masses[static_cast<std::size_t>(i)].inertia;
+        }
+        Eigen::MatrixXd c =
+            Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(d().gears.size() + d().planetaries.size()));
+        Eigen::Index column = 0;
+        for (const auto& g : d().gears) {
+            c(index(g.a), column) = 1;
+            c(index(g.b), column++) = -g.ratio;
+        }
+        for (const auto& r : d().planetaries) {
+            c(index(r.sun), column) = 1;
+            c(index(r.ring), column) = -r.ratio;
+            c(index(r.carrier), column++) = r.ratio - 1;
+        }
+        if (c.cols() > 0) {
+            const Eigen::MatrixXd jc = j.cwiseInverse().asDiagonal() * c;
+            omega -= jc * (c.transpose() * jc).ldlt().solve(c.transpose() * omega);
+        }
+        const double largest = omega.lpNorm<Eigen::Infinity>();
+        if (largest > 300) omega *= 300 / largest;
+        for (Eigen::Index i = 0; i < n; ++i) d().masses[static_cast<std::size_t>(i)].initial_speed = omega[i];
+    }
+
+    Dice dice_;
+    double seconds_;
+    RandomSystem system_;
+    double torque_level_ = 0;
+    bool many_clutch_paths_ = false, grounded_ = false;
+    std::vector<double> instants_;
+    int count_ = 0, lossy_ = 0;
+};
+
+}  // namespace
+
+RandomSystem random_system(std::uint64_t seed, double seconds) {
+    return Builder(seed, seconds).build();
+}
+
+double impulse(const Waveform& waveform, double until) {
+    double sum = 0;
+    for (const auto& p : waveform.pieces) {
+        const double a = std::max(0.0, p.from), b = std::min(until, p.until);
+        if (b <= a) continue;
+        sum += p.offset * (b - a);
+        if (p.slope != 0) sum += p.slope * ((b - p.from) * (b - p.from) - (a - p.from) * (a - p.from)) / 2;
+        if (p.amplitude != 0) {
+            const double w = 2 * std::numbers::pi * p.frequency;
+            sum += p.amplitude / w * (std::cos(w * (a - p.phase_time)) - std::cos(w * (b - p.phase_time)));
+        }
+    }
+    return sum;
+}
+
+}  // namespace shiftrig

@@ -1,0 +1,26 @@
+// Random regular mechanical systems: any machine a user could write down from masses, shafts, dampers,
+// clutches, brakes, gears and planetary rows, with everything that makes such a machine hard: loops,
+// light bodies between heavy ones, lossy meshes that stick, several clutches acting in one instant.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "plant/description.h"
+
+namespace shiftrig {
+
+struct RandomSystem {
+    plant::Description description;
+    // No housing, gear or quadratic load: Σ Jω changes by the impulse of the sources alone.
+    bool momentum_is_conserved = false;
+    std::string traits;  // "n=7 light lossy loop row shift …", for statistics
+};
+
+// The same seed gives the same system on every machine.
+RandomSystem random_system(std::uint64_t seed, double seconds);
+
+// ∫ waveform dt from 0 to `until`.
+double impulse(const plant::Waveform& waveform, double until);
+
+}  // namespace shiftrig

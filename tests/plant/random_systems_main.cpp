@@ -1,0 +1,110 @@
+// shiftrig_random_systems: thousands of random machines on plant::step and on the reference solver.
+// Exit 0 only if every comparable system agrees, no invariant breaks and at most 1 % are not comparable.
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/plant/comparison.h"
+
+namespace {
+
+using namespace shiftrig;
+
+struct Arguments {
+    long count = 100, jobs = 1;
+    std::uint64_t seed = 1;
+    ComparisonOptions options;
+    bool verbose = false;
+};
+
+const char usage[] =
+    "usage: shiftrig_random_systems [--count N] [--seed S] [--seconds T] [--jobs J] [--verbose]\n"
+    "  systems S … S+N−1, each simulated for T seconds at 1 ms; --verbose prints each that does not agree\n";
+
+bool parse(int argc, char** argv, Arguments& a) {
+    for (int i = 1; i < argc; ++i) {
+        const std::string key = argv[i];
+        if (key == "--verbose") {
+            a.verbose = true;
+            continue;
+        }
+        if (i + 1 >= argc) return false;
+        const char* value = argv[++i];
+        if (key == "--count")
+            a.count = std::atol(value);
+        else if (key == "--seed")
+            a.seed = std::strtoull(value, nullptr, 10);
+        else if (key == "--seconds")
+            a.options.seconds = std::atof(value);
+        else if (key == "--jobs")
+            a.jobs = std::atol(value);
+        else
+            return false;
+    }
+    return a.count > 0 && a.jobs > 0 && a.options.seconds > 0.01;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    Arguments arguments;
+    if (!parse(argc, argv, arguments)) {
+        std::fputs(usage, stderr);
+        return 2;
+    }
+    std::atomic<long> next = 0;
+    std::mutex lock;
+    std::map<Outcome, long> tally;
+    double worst_agreeing = 0, worst_defect = 0, reference_seconds = 0;
+    long fall_backs = 0, events = 0;
+    const auto work = [&] {
+        for (long i; (i = next++) < arguments.count;) {
+            const std::uint64_t seed = arguments.seed + static_cast<std::uint64_t>(i);
+            const RandomSystem system = random_system(seed, arguments.options.seconds);
+            Comparison c;
+            try {
+                c = compare(system, seed, arguments.options);
+            } catch (const std::exception& error) {
+                c.outcome = Outcome::broken;
+                c.broken.push_back(error.what());
+            }
+            const std::lock_guard guard(lock);
+            ++tally[c.outcome];
+            fall_backs += c.fall_backs;
+            events += c.events;
+            reference_seconds += c.seconds_reference;
+            worst_defect = std::max(worst_defect, c.energy_defect);
+            if (c.outcome == Outcome::agrees) {
+                worst_agreeing = std::max(worst_agreeing, c.worst);
+                continue;
+            }
+            if (c.outcome == Outcome::sensitive && !arguments.verbose) continue;
+            std::printf("%llu %s: %.3g tolerances (speeds %.3g) on %s at %.3f s, %d fall-backs; %s\n",
+                        static_cast<unsigned long long>(seed), name(c.outcome), c.worst, c.worst_speed,
+                        c.worst_signal.c_str(), c.worst_time, c.fall_backs, system.traits.c_str());
+            for (const auto& line : c.broken) std::printf("    %s\n", line.c_str());
+            if (arguments.verbose) std::fputs(describe(system.description).c_str(), stdout);
+            std::fflush(stdout);
+        }
+    };
+    std::vector<std::thread> threads;
+    for (long j = 0; j < arguments.jobs; ++j) threads.emplace_back(work);
+    for (auto& t : threads) t.join();
+    std::printf("%ld systems of %g s:", arguments.count, arguments.options.seconds);
+    for (const auto& [outcome, number] : tally) std::printf(" %ld %s;", number, name(outcome));
+    std::printf(
+        "\nlargest difference where they agree %.2g tolerances (1e-4 of the signal's range); %ld events, %ld "
+        "fall-backs;\n"
+        "worst ledger defect %.1e of the energy moved; reference %.3f s per system\n",
+        worst_agreeing, events, fall_backs, worst_defect,
+        reference_seconds / static_cast<double>(arguments.count));
+    const long incomparable = tally[Outcome::sensitive] + tally[Outcome::reference_failed];
+    const bool good = tally[Outcome::disagrees] == 0 && tally[Outcome::broken] == 0 &&
+                      100 * incomparable <= arguments.count;
+    return good ? 0 : 1;
+}
