@@ -21,6 +21,7 @@ struct Change {
     plant::Event event;
     std::string device;  // "F2"; empty: the rig's own
     std::string text;    // plant::explain(), or the rig's words
+    std::string kind{};  // "lock", "safe_command": as scenarios name it
 };
 
 struct Run {

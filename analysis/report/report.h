@@ -12,8 +12,8 @@ namespace shiftrig::analysis {
 
 struct ReportOptions {
     std::string title;
-    std::string driveline_svg;                       // drawing of run.machine, ids as in driveline_svg.h
-    int points = 6000;                               // of each plotted line, at most about this many
+    std::string driveline_svg;                         // drawing of run.machine, ids as in driveline_svg.h
+    int points = 6000;                                 // of each plotted line, at most about this many
     std::vector<std::pair<double, double>> windows{};  // [s] shown in full resolution (the shifts)
 };
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "io/recording/event_names.h"
+
 namespace shiftrig::rig {
 
 namespace {
@@ -57,11 +59,12 @@ analysis::Run Collector::finish(const Rig& rig) {
     const auto& devices = rig.model().device_names();
     for (const auto& event : plant_events_)
         run_.changes.push_back({event, event.device >= 0 ? devices[static_cast<std::size_t>(event.device)] : "",
-                                plant::explain(rig.model(), event)});
+                                plant::explain(rig.model(), event), std::string(io::name(event.kind))});
     for (const auto& event : rig_events_) {
         analysis::Change change;
         change.event.time = event.time;
         change.text = explain(rig.signals(), event);
+        change.kind = name(event.kind);
         run_.changes.push_back(std::move(change));
     }
     std::stable_sort(run_.changes.begin(), run_.changes.end(),

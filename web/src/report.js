@@ -35,7 +35,7 @@ function heading() {
 
 function summary() {
   const shifts = data.shifts.length, completed = data.shifts.filter((s) => s.completed).length;
-  const worst = data.shifts.some((s) => s.verdict === "reject") ? "reject" : data.shifts.some((s) => s.verdict === "fair") ? "fair" : "good";
+  const worst = data.shifts.some((s) => s.verdict === "reject") ? "reject" : data.shifts.some((s) => s.verdict === "acceptable") ? "acceptable" : "good";
   if (!shifts) return h("p", { class: "panel" }, "No shift was commanded in this recording.");
   return h("p", { class: "panel" }, h("span", { class: `verdict ${worst}` }, worst.toUpperCase()), ` – ${completed} of ${shifts} shifts completed.`);
 }
@@ -50,7 +50,7 @@ function scorecard(shifts) {
     h("div", { class: "row" },
       h("h3", {}, `${index + 1}. ${shift.from} → ${shift.to}`),
       h("span", { class: "faint" }, `${shift.kind}, commanded at ${format(shift.command_s, 3)} s`),
-      h("span", { class: `verdict ${shift.verdict}` }, shift.completed ? shift.verdict : "not completed"),
+      h("span", { class: `verdict ${shift.verdict}` }, shift.completed ? shift.verdict : `not completed: ${shift.end}`),
       h("button", { class: "no-print", onclick: () => window.shiftrigPlots?.zoom(shift.command_s - 0.5, shift.end_s + 1) }, "Show in plots")),
     shift.phases.length ? h("p", { class: "faint" }, shift.phases.map((p) => `${p.name} ${format(p.to - p.from, 3)} s`).join(" · ")) : null,
     h("div", { class: "scroll" }, h("table", {},

@@ -1,0 +1,291 @@
+#include "apps/serve/dashboard.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "analysis/report/shift_page.h"
+#include "apps/serve/machine_page.h"
+
+namespace shiftrig::serve {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr auto feed_interval = std::chrono::milliseconds(40);
+constexpr std::int64_t frame_interval_ns = 15'000'000;
+constexpr double kept_seconds = 60;  // for the scorecard of the last shift
+
+// What a number in a command is, or why it is none.
+std::string number_in(const json& body, const char* key, double& value) {
+    if (!body.contains(key) || !body[key].is_number()) return std::string("\"") + key + "\" must be a number";
+    value = body[key].get<double>();
+    return std::isfinite(value) ? "" : std::string("\"") + key + "\" must be finite";
+}
+
+}  // namespace
+
+Dashboard::Dashboard(rig::Rig& rig, DashboardOptions options) : rig_(rig), options_(std::move(options)) {
+    const auto& table = rig.signals();
+    for (const auto& name : analysis::scorecard_signals(rig.model().description())) {
+        const int index = table.find(name);
+        if (index >= 0 && judged_.size() < most_judged) judged_.push_back(index);
+    }
+    for (const int index : judged_) recent_.columns.push_back({table.signal(index), {}});
+    recent_.machine = rig.model().description();
+    factor_ = options_.loop.factor;
+    http_ = std::make_unique<HttpServer>(
+        options_.http, feed_,
+        Handlers{[this] { return model_json(); },
+                 [this](std::string_view verb, const std::string& body) { return command(verb, body); },
+                 [this] { return recording_bytes(); }});
+    feeder_ = std::thread([this] { feed(); });
+}
+
+Dashboard::~Dashboard() {
+    ending_ = true;
+    feeder_.join();
+    http_.reset();
+}
+
+// ---- main thread ----------------------------------------------------------------------------------------
+
+rt::LoopReport Dashboard::run() {
+    rt::LoopReport report;
+    if (options_.record_at_once) (void)command("record", R"({"active":true})");
+    auto slots_left = options_.loop.slots;
+    while (!stopping_ && slots_left > 0) {
+        {
+            const std::lock_guard lock(mutex_);
+            for (auto& what : waiting_) what();
+            waiting_.clear();
+        }
+        rig::SessionOptions session_options;
+        session_options.loop = options_.loop;
+        session_options.loop.slots = slots_left;
+        session_options.recording = recording_.get();
+        session_options.after = [this](rig::Rig& r, const rt::Tick& t) { take(r, t); };
+        rig::Session session(rig_, std::move(session_options));
+        {
+            const std::lock_guard lock(mutex_);
+            if (paused_) session.control().pause();
+            session.control().set_factor(factor_);
+            control_ = &session.control();
+            if (stopping_ || !waiting_.empty()) session.control().stop();
+        }
+        report = session.run();
+        control_ = nullptr;
+        slots_left -= report.executed + report.skipped;
+    }
+    const std::lock_guard lock(mutex_);
+    if (recording_) recording_->end();
+    return report;
+}
+
+void Dashboard::stop() noexcept {
+    stopping_ = true;
+    if (auto* control = control_.load()) control->stop();
+}
+
+void Dashboard::between_stretches(std::function<void()> what) {
+    const std::lock_guard lock(mutex_);
+    waiting_.push_back(std::move(what));
+    if (auto* control = control_.load()) control->stop();
+}
+
+// ---- in the loop ----------------------------------------------------------------------------------------
+
+void Dashboard::take(const rig::Rig& rig, const rt::Tick& tick) SHIFTRIG_REALTIME {
+    const double time = rig.sim_time();
+    Row row;
+    row.time = time;
+    for (std::size_t i = 0; i < judged_.size(); ++i) row.value[i] = rig.value(judged_[i]);
+    rows_.push(row);
+    for (const auto& event : rig.plant_events()) happenings_.push({false, event, {}});
+    for (const auto& event : rig.rig_events()) happenings_.push({true, {}, event});
+
+    if (tick.start - last_frame_ns_ < frame_interval_ns && tick.start >= last_frame_ns_) return;
+    last_frame_ns_ = tick.start;
+    filling_.time = time;
+    filling_.ticks = rig.ticks();
+    filling_.overruns = static_cast<std::int64_t>(rig.value(rig.own().overruns));
+    filling_.count = static_cast<std::uint32_t>(
+        std::min<std::size_t>(most_signals, static_cast<std::size_t>(rig.signals().size())));
+    for (std::uint32_t i = 0; i < filling_.count; ++i) filling_.value[i] = rig.value(static_cast<int>(i));
+    frames_.write(filling_);
+}
+
+// ---- feeding thread -------------------------------------------------------------------------------------
+
+void Dashboard::feed() {
+    auto next = std::chrono::steady_clock::now();
+    int round = 0;
+    while (!ending_) {
+        const Frame& frame = frames_.read();
+        if (frame.count > 0) feed_.sample(sample_json(frame));
+        tell_events();
+        Row row;
+        while (rows_.pop(row)) {
+            recent_.time.push_back(row.time);
+            for (std::size_t i = 0; i < judged_.size(); ++i) recent_.columns[i].value.push_back(row.value[i]);
+        }
+        if (++round % 25 == 0) judge_shifts();
+        next += feed_interval;
+        std::this_thread::sleep_until(next);
+    }
+}
+
+std::string Dashboard::sample_json(const Frame& frame) const {
+    std::string text = "{\"t\":" + std::to_string(frame.time) + ",\"v\":[";
+    char number[32];
+    for (std::uint32_t i = 0; i < frame.count; ++i) {
+        const double v = frame.value[i];
+        std::snprintf(number, sizeof number, i ? ",%.7g" : "%.7g", v);
+        text += std::isfinite(v) ? number : (i ? ",null" : "null");
+    }
+    json rest;
+    {
+        const std::lock_guard lock(mutex_);
+        rest["health"] =
+            "tick " + std::to_string(frame.ticks) + ", overruns " + std::to_string(frame.overruns) +
+            ", load " +
+            std::to_string(
+                static_cast<int>(100 * frame.value[static_cast<std::size_t>(rig_.own().tick_load)])) +
+            " %" + (paused_ ? ", paused" : "") + (recording_ ? ", recording to " + recorded_to_ : "");
+    }
+    if (frame.value[static_cast<std::size_t>(rig_.own().safe_command)] > 0)
+        rest["banner"] = "The controller is silent: the safe command acts.";
+    text += "],\"health\":" + rest["health"].dump();
+    if (rest.contains("banner")) text += ",\"banner\":" + rest["banner"].dump();
+    return text + "}";
+}
+
+void Dashboard::tell_events() {
+    Happening happening;
+    while (happenings_.pop(happening)) {
+        const std::string text = happening.of_the_rig ? rig::explain(rig_.signals(), happening.own)
+                                                      : plant::explain(rig_.model(), happening.plant);
+        feed_.change("change", json{{"text", text}}.dump());
+    }
+}
+
+// The last shift whose judgement is settled and that has not been told yet.
+void Dashboard::judge_shifts() {
+    if (recent_.time.size() < 100) return;
+    const auto limits = analysis::default_limits();
+    const auto card = analysis::score(recent_, limits);
+    for (const auto& score : card.shifts) {
+        const double settled = recent_.time[score.shift.settled];
+        const bool over = score.shift.end != analysis::ShiftEnd::run_ended && settled < recent_.time.back();
+        if (!over || score.shift.ended_at <= told_until_) continue;
+        told_until_ = score.shift.ended_at;
+        feed_.change("shift", analysis::shift_page(recent_, score, limits).dump());
+    }
+    if (recent_.time.back() - recent_.time.front() < kept_seconds) return;
+    const auto from =
+        std::lower_bound(recent_.time.begin(), recent_.time.end(), recent_.time.back() - kept_seconds / 2);
+    const auto rows = from - recent_.time.begin();
+    recent_.time.erase(recent_.time.begin(), from);
+    for (auto& column : recent_.columns)
+        column.value.erase(column.value.begin(), column.value.begin() + rows);
+}
+
+// ---- HTTP threads ---------------------------------------------------------------------------------------
+
+std::string Dashboard::model_json() const {
+    return machine_page(rig_).dump();
+}
+
+std::string Dashboard::command(std::string_view verb, const std::string& text) {
+    const json body = json::parse(text, nullptr, false);
+    if (!body.is_object()) return "a command is a JSON object";
+    double value = 0;
+    if (verb == "input") {
+        if (!body.contains("signal") || !body["signal"].is_string()) return "\"signal\" must be a name";
+        if (auto wrong = number_in(body, "value", value); !wrong.empty()) return wrong;
+        const std::string name = body["signal"].get<std::string>();
+        const std::lock_guard lock(mutex_);
+        if (!rig_.request(rig_.signals().find(name), value)) return "signal \"" + name + "\" cannot be set";
+        return "";
+    }
+    if (verb == "fault") {
+        if (!body.contains("name") || !body["name"].is_string()) return "\"name\" must be a fault";
+        if (!body.contains("active") || !body["active"].is_boolean())
+            return "\"active\" must be true or false";
+        for (const auto& fault : faults_of(rig_))
+            if (fault.name == body["name"].get<std::string>()) {
+                const std::lock_guard lock(mutex_);
+                return rig_.request(fault.signal, body["active"].get<bool>() ? fault.active : fault.healthy)
+                           ? ""
+                           : "the rig is busy, try again";
+            }
+        return "there is no such fault";
+    }
+    if (verb == "pause") {
+        if (!body.contains("paused") || !body["paused"].is_boolean())
+            return "\"paused\" must be true or false";
+        const std::lock_guard lock(mutex_);
+        paused_ = body["paused"].get<bool>();
+        if (auto* control = control_.load()) paused_ ? control->pause() : control->resume();
+        return "";
+    }
+    if (verb == "step") {
+        const std::lock_guard lock(mutex_);
+        if (!paused_) return "pause first";
+        if (auto* control = control_.load()) control->single_step();
+        return "";
+    }
+    if (verb == "speed") {
+        if (auto wrong = number_in(body, "factor", value); !wrong.empty()) return wrong;
+        if (!(value >= 0.001 && value <= 10)) return "\"factor\" must be from 0.001 to 10";
+        const std::lock_guard lock(mutex_);
+        factor_ = value;
+        if (auto* control = control_.load()) control->set_factor(value);
+        return "";
+    }
+    if (verb == "record") {
+        if (!body.contains("active") || !body["active"].is_boolean())
+            return "\"active\" must be true or false";
+        const bool active = body["active"].get<bool>();
+        between_stretches([this, active] {
+            if (recording_) recording_->end();
+            recording_.reset();
+            if (!active) return;
+            recorded_to_ = options_.record_path;
+            if (recordings_++ > 0) {
+                const std::filesystem::path path(options_.record_path);
+                recorded_to_ =
+                    (path.parent_path() /
+                     (path.stem().string() + "-" + std::to_string(recordings_) + path.extension().string()))
+                        .string();
+            }
+            try {
+                recording_ = std::make_unique<io::RecordingWriter>(recorded_to_);
+            } catch (const io::RecordingError& error) {
+                feed_.change("change", json{{"text", error.what()}}.dump());
+            }
+        });
+        return "";
+    }
+    return "there is no command \"" + std::string(verb) + "\"";
+}
+
+std::string Dashboard::recording_bytes() const {
+    std::string path;
+    {
+        const std::lock_guard lock(mutex_);
+        path = recorded_to_;
+    }
+    if (path.empty()) return "";
+    std::ifstream in(path, std::ios::binary);
+    std::ostringstream bytes;
+    bytes << in.rdbuf();
+    return bytes.str();
+}
+
+}  // namespace shiftrig::serve

@@ -1,0 +1,3 @@
+add_executable(expectations_test ${CMAKE_CURRENT_LIST_DIR}/expectations_test.cpp)
+target_link_libraries(expectations_test PRIVATE shiftrig_analysis GTest::gtest_main)
+gtest_discover_tests(expectations_test)
