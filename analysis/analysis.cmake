@@ -12,5 +12,5 @@ add_custom_command(
   DEPENDS ${LIMITS} ${CMAKE_SOURCE_DIR}/scripts/embed.cmake)
 add_library(shiftrig_analysis STATIC ${SCORECARD_SOURCES} ${CMAKE_BINARY_DIR}/limits_text.cpp)
 target_link_libraries(shiftrig_analysis
-  PUBLIC shiftrig_plant shiftrig_recording nlohmann_json::nlohmann_json
+  PUBLIC shiftrig_plant shiftrig_recording shiftrig_model nlohmann_json::nlohmann_json
   PRIVATE Eigen3::Eigen yaml-cpp)

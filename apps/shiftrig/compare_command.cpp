@@ -1,0 +1,85 @@
+// shiftrig compare: two recordings or result sets, and which shift got worse.
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "analysis/compare.h"
+#include "apps/shiftrig/command.h"
+
+namespace shiftrig::cli {
+
+namespace {
+
+using analysis::Difference;
+
+struct Options {
+    std::string before, after, limits;
+    double tolerance_percent = 2;
+    bool json = false;
+};
+
+const char* word(Difference::Kind kind) {
+    switch (kind) {
+        case Difference::Kind::worse:
+            return "worse";
+        case Difference::Kind::better:
+            return "better";
+        case Difference::Kind::missing:
+            return "missing";
+        case Difference::Kind::added:
+            return "added";
+    }
+    return "";
+}
+
+int run(const Options& options) {
+    const analysis::Limits limits =
+        options.limits.empty() ? analysis::default_limits() : analysis::read_limits(options.limits);
+    const nlohmann::json before = analysis::read_results(options.before, limits);
+    const nlohmann::json after = analysis::read_results(options.after, limits);
+    const std::vector<Difference> differences =
+        analysis::compare(before, after, limits, {.relative = options.tolerance_percent / 100});
+    const auto worse = std::count_if(differences.begin(), differences.end(), [](const Difference& d) {
+        return d.kind == Difference::Kind::worse || d.kind == Difference::Kind::missing;
+    });
+    if (options.json) {
+        nlohmann::json list = nlohmann::json::array();
+        for (const Difference& d : differences) {
+            list.push_back({{"kind", word(d.kind)},
+                            {"run", d.run},
+                            {"shift", d.shift},
+                            {"metric", d.metric},
+                            {"before", d.before},
+                            {"after", d.after}});
+        }
+        std::cout << nlohmann::json{{"worse", worse}, {"differences", list}}.dump(2) << '\n';
+    } else {
+        for (const Difference& d : differences) std::cout << d.text() << '\n';
+        std::size_t shifts = 0;
+        for (const auto& one : before) shifts += one.size();
+        std::cout << shifts << " shifts compared, " << worse << " differences for the worse\n";
+    }
+    return worse > 0 ? failed : good;
+}
+
+Command::Run declare(CLI::App& app) {
+    auto options = std::make_shared<Options>();
+    app.add_option("BEFORE", options->before,
+                   "a recording, a result of run --json or test --json, or a folder of them")
+        ->required();
+    app.add_option("AFTER", options->after, "the same runs, later")->required();
+    app.add_option("--limits", options->limits, "limits (default: those of config/limits.yaml)");
+    app.add_option("--tolerance", options->tolerance_percent, "changes up to this many percent are none")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    app.add_flag("--json", options->json, "for programs");
+    app.footer("Exit code 1 if anything got worse or a shift is missing.");
+    return [options] { return run(*options); };
+}
+
+const Command compare("compare", "two recordings or result sets: what got worse", declare);
+
+}  // namespace
+
+}  // namespace shiftrig::cli

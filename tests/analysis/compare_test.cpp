@@ -1,0 +1,143 @@
+#include "analysis/compare.h"
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "io/input_error.h"
+
+namespace shiftrig::analysis {
+namespace {
+
+using nlohmann::json;
+using Kind = Difference::Kind;
+
+json shift(const char* from, const char* to, double duration, double energy) {
+    return {{"from", from},
+            {"to", to},
+            {"kind", "power upshift"},
+            {"completed", true},
+            {"duration_s", duration},
+            {"fill_time_s", 0.09},
+            {"peak_jerk_m_s3", 8.0},
+            {"slip_time_s", {{"Fc", 0.0}}},
+            {"clutch_energy_j", {{"F2", 120.0}, {"F3", energy}}}};
+}
+
+json two_runs() {
+    return {{"plough", json::array({shift("F2", "F3", 0.412, 3100), shift("F3", "F4", 0.45, 3500)})},
+            {"road", json::array({shift("F1", "F2", 0.31, 900), shift("F2", "F1", 0.3, 800),
+                                  shift("F1", "F2", 0.33, 950)})}};
+}
+
+TEST(Compare, IsSilentOnIdenticalResults) {
+    EXPECT_TRUE(compare(two_runs(), two_runs(), default_limits()).empty());
+}
+
+TEST(Compare, FindsThePlantedDegradationOfOneShiftAndNothingElse) {
+    json after = two_runs();
+    after["road"][2]["duration_s"] = 0.33 * 1.1;
+    const std::vector<Difference> found = compare(two_runs(), after, default_limits());
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].text(), "road F1->F2 (2): duration_s 0.33 → 0.363 (+10.0 %), worse");
+    EXPECT_EQ(found[0].kind, Kind::worse);
+}
+
+TEST(Compare, FindsThePlantedDegradationOfEachMetricOfEachShift) {
+    for (const char* path :
+         {"/plough/0/duration_s", "/plough/0/clutch_energy_j/F3", "/plough/1/clutch_energy_j/F3",
+          "/road/1/clutch_energy_j/F3", "/road/0/peak_jerk_m_s3"}) {
+        json after = two_runs();
+        double& value = after[json::json_pointer(path)].get_ref<double&>();
+        value *= 1.1;
+        const auto found = compare(two_runs(), after, default_limits());
+        ASSERT_EQ(found.size(), 1u) << path;
+        EXPECT_NEAR(found[0].after / found[0].before, 1.1, 1e-12);
+        const auto back = compare(after, two_runs(), default_limits());
+        ASSERT_EQ(back.size(), 1u) << path;
+        EXPECT_EQ(back[0].kind, Kind::better);
+    }
+}
+
+TEST(Compare, ChangesOfWhatIsOnlyToldAreNone) {
+    json after = two_runs();
+    after["road"][0]["fill_time_s"] = 0.2;
+    EXPECT_TRUE(compare(two_runs(), after, default_limits()).empty());
+}
+
+TEST(Compare, FromNothingToSomethingCounts) {
+    json after = two_runs();
+    after["plough"][0]["slip_time_s"]["Fc"] = 0.05;
+    const auto found = compare(two_runs(), after, default_limits());
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].text(), "plough F2->F3: slip_time_s.Fc 0 → 0.05, worse");
+}
+
+TEST(Compare, LostCompletionAndLostShiftsComeFirst) {
+    json after = two_runs();
+    after["plough"][0]["completed"] = false;
+    after["plough"][0]["duration_s"] = 0.3;
+    after["road"].erase(2);
+    const auto found = compare(two_runs(), after, default_limits());
+    ASSERT_EQ(found.size(), 3u);
+    EXPECT_EQ(found[0].text(), "road F1->F2 (2): no longer there");
+    EXPECT_EQ(found[1].text(), "plough F2->F3: no longer completed, worse");
+    EXPECT_EQ(found[2].kind, Kind::better);
+}
+
+TEST(Compare, SingleRunsAreComparedWhateverTheirNames) {
+    const json before{{"yesterday", json::array({shift("F2", "F3", 0.4, 3000)})}};
+    const json after{{"today", json::array({shift("F2", "F3", 0.4, 3000), shift("F3", "F4", 0.4, 3000)})}};
+    const auto found = compare(before, after, default_limits());
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].text(), "today F3->F4: was not there before");
+}
+
+class ResultFiles : public ::testing::Test {
+  protected:
+    void SetUp() override {
+        char name[] = "/tmp/compare_test_XXXXXX";
+        folder = mkdtemp(name);
+    }
+    void TearDown() override { std::filesystem::remove_all(folder); }
+    std::string file(const std::string& name, const std::string& text) {
+        std::ofstream(folder / name) << text;
+        return (folder / name).string();
+    }
+    std::string refusal(const std::string& path) {
+        try {
+            read_results(path, default_limits());
+        } catch (const io::InputError& error) {
+            return std::string(error.what()).substr(folder.string().size() + 1);
+        }
+        return "accepted";
+    }
+    std::filesystem::path folder;
+};
+
+TEST_F(ResultFiles, AreReadAloneInListsAndInFolders) {
+    const json shifts = two_runs()["road"];
+    const std::string one = file("one.json", json{{"shifts", shifts}}.dump());
+    EXPECT_EQ(read_results(one, default_limits()), (json{{"one", shifts}}));
+    const std::string list =
+        file("list.json", json{{"runs",
+                                {{{"scenario", "config/scenarios/a.yaml"}, {"shifts", shifts}},
+                                 {{"name", "b"}, {"shifts", json::array()}}}}}
+                              .dump());
+    EXPECT_EQ(read_results(list, default_limits()), (json{{"a", shifts}, {"b", json::array()}}));
+    EXPECT_EQ(read_results(folder.string(), default_limits()).size(), 3u);
+}
+
+TEST_F(ResultFiles, WrongOnesAreRefusedInOneLine) {
+    EXPECT_EQ(refusal((folder / "none").string()), "none: no such file");
+    EXPECT_EQ(refusal(file("broken.json", "{\"shifts\": [")), "broken.json: neither a recording nor JSON");
+    EXPECT_EQ(
+        refusal(file("other.json", "{}")),
+        "other.json: no \"shifts\" in it; must be a result of run --json or test --json, or a recording");
+}
+
+}  // namespace
+}  // namespace shiftrig::analysis
