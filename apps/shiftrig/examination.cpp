@@ -1,10 +1,12 @@
 #include "apps/shiftrig/examination.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <ostream>
 
 #include "apps/shiftrig/text_table.h"
+#include "plant/rigid_set.h"
 #include "plant/structure.h"
 
 namespace shiftrig::cli {
@@ -114,6 +116,53 @@ void print_shapes(std::ostream& out, const Examination& examination, const std::
     table.print(out);
 }
 
+std::vector<Examination::TieUp> find_tie_ups(const plant::Description& machine,
+                                             const plant::Structure& structure) {
+    std::vector<Examination::TieUp> result;
+    const int output = structure.mass(machine.output_mass);
+    const auto examine = [&](const std::string& gear, const std::string& with,
+                             std::vector<std::string> closed) {
+        if (!with.empty()) closed.push_back(with);
+        const plant::RigidSet set = plant::rigid_set(machine, structure, closed);
+        const Eigen::MatrixXd motions = plant::motions(set, structure.inertia);
+        Examination::TieUp found{gear, with, false, {}};
+        found.blocks =
+            output >= 0 &&
+            (motions.cols() == 0 ||
+             motions.row(output).norm() * std::sqrt(structure.inertia[static_cast<std::size_t>(output)]) <
+                 1e-9);
+        for (const auto& loop : plant::tie_ups(set, structure.inertia))
+            found.loop.insert(found.loop.end(), loop.devices.begin(), loop.devices.end());
+        if (found.blocks || !found.loop.empty()) result.push_back(std::move(found));
+    };
+    for (const auto& path : machine.gear_paths) {
+        examine(path.name, "", path.closed);
+        for (const auto& clutch : machine.clutches)
+            if (std::find(path.closed.begin(), path.closed.end(), clutch.name) == path.closed.end())
+                examine(path.name, clutch.name, path.closed);
+    }
+    return result;
+}
+
+void print_tie_ups(std::ostream& out, const Examination& examination) {
+    if (examination.tie_ups.empty()) return;
+    out << "\ntie-ups\n";
+    for (const auto& path : examination.machine.gear_paths) {
+        std::vector<std::string> blocking;
+        for (const auto& tie_up : examination.tie_ups) {
+            if (tie_up.gear != path.name) continue;
+            if (tie_up.blocks && tie_up.with.empty()) out << "  " << path.name << " blocks the output\n";
+            if (tie_up.blocks && !tie_up.with.empty()) blocking.push_back(tie_up.with);
+            if (!tie_up.loop.empty())
+                out << "  " << path.name << (tie_up.with.empty() ? "" : " with " + tie_up.with) << ": "
+                    << joined(tie_up.loop, ", ")
+                    << " form a loop, the split of their torques is not unique\n";
+        }
+        if (!blocking.empty())
+            out << "  " << path.name << " with any of " << joined(blocking, ", ") << " blocks the output\n";
+    }
+}
+
 }  // namespace
 
 Examination examine(const io::ModelFile& file) {
@@ -134,6 +183,7 @@ Examination examine(const io::ModelFile& file) {
             result.gears.push_back({std::move(variant), std::move(modal)});
         }
         result.open = plant::natural_modes(file.description, {});
+        result.tie_ups = find_tie_ups(file.description, structure);
         result.warnings = plant::model_warnings(file.description);
         return result;
     } catch (const plant::ModelError& error) {
@@ -162,9 +212,12 @@ nlohmann::ordered_json as_json(const Examination& examination) {
         gear["modes_hz"] = frequencies(modal);
         gears.push_back(gear);
         modes[variant.name] = modes_as_json(examination, modal);
-        for (const auto& loop : variant.tie_ups)
-            tie_ups.push_back({{"gear", variant.name}, {"devices", loop.devices}});
     }
+    for (const auto& tie_up : examination.tie_ups)
+        tie_ups.push_back({{"gear", tie_up.gear},
+                           {"with", tie_up.with.empty() ? json() : json(tie_up.with)},
+                           {"blocks", tie_up.blocks},
+                           {"loop", tie_up.loop}});
     modes["open"] = modes_as_json(examination, examination.open);
     return {{"name", examination.machine.name},
             {"masses", masses},
@@ -187,10 +240,7 @@ void print(std::ostream& out, const Examination& examination, bool with_shapes) 
             print_shapes(out, examination, variant.name, modal);
         print_shapes(out, examination, "all open", examination.open);
     }
-    for (const auto& [variant, modal] : examination.gears)
-        for (const auto& loop : variant.tie_ups)
-            out << "\ntie-up in " << variant.name << ": " << joined(loop.devices, ", ")
-                << " form a loop; the split of their torques is not unique\n";
+    print_tie_ups(out, examination);
     if (!examination.warnings.empty()) out << "\nwarnings\n";
     for (const auto& warning : examination.warnings) out << "  " << warning << '\n';
 }

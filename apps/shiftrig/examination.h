@@ -17,11 +17,19 @@ struct Examination {
         plant::GearVariant variant;
         plant::ModalResult modal;
     };
+    // What happens where one more clutch or brake is closed than a gear path closes.
+    struct TieUp {
+        std::string gear;               // path
+        std::string with;               // the one more; empty: the path itself
+        bool blocks = false;            // the output cannot turn
+        std::vector<std::string> loop;  // devices whose torque split is not unique; empty: no loop
+    };
     plant::Description machine;
     std::vector<std::string> masses, devices;  // rows and columns of the distribution matrix
     Eigen::MatrixXd distribution;              // [Algin] SDM: one column per device
     std::vector<Gear> gears;
     plant::ModalResult open;  // every clutch and brake open
+    std::vector<TieUp> tie_ups;
     std::vector<std::string> warnings;
 };
 

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <string>
 
+#include "io/yaml_document.h"
+
 namespace shiftrig::io {
 namespace {
 
@@ -66,7 +68,9 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 TEST(ModelFile, EveryShippedModelIsReadAndValid) {
     int models = 0;
     for (const auto& entry : std::filesystem::directory_iterator(config)) {
-        if (entry.path().extension() != ".yaml") continue;
+        if (entry.path().extension() != ".yaml" ||
+            read_text(entry.path()).find("\nmasses:") == std::string::npos)
+            continue;  // not a model
         EXPECT_NO_THROW(read_model(entry.path().string())) << entry.path();
         ++models;
     }

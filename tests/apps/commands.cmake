@@ -1,0 +1,14 @@
+find_package(nlohmann_json REQUIRED)
+foreach(subject check_command statics_command)
+  add_executable(${subject}_test ${CMAKE_CURRENT_LIST_DIR}/${subject}_test.cpp)
+  target_compile_definitions(${subject}_test PRIVATE
+    SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}" SHIFTRIG_PROGRAM="$<TARGET_FILE:shiftrig>")
+  target_link_libraries(${subject}_test PRIVATE shiftrig_options nlohmann_json::nlohmann_json GTest::gtest_main)
+  add_dependencies(${subject}_test shiftrig)
+  gtest_discover_tests(${subject}_test)
+endforeach()
+
+add_executable(tractor_test ${CMAKE_CURRENT_LIST_DIR}/tractor_test.cpp)
+target_compile_definitions(tractor_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+target_link_libraries(tractor_test PRIVATE shiftrig_model GTest::gtest_main)
+gtest_discover_tests(tractor_test)
