@@ -164,6 +164,7 @@ void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIF
 }
 
 void internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    if (mode.tree) return tree_internal_torques(w, mode, s);
     const ModelData& m = w.model;
     double* active = w.scratch.vector_c.data();
     m.kernel.multiply(mode.torques, padded(mode.row_count) / panel_rows, m.columns, s.z, nullptr, active);

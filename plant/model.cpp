@@ -221,6 +221,18 @@ void build_sizes(ModelData& m) {
     m.columns = m.states_padded + m.forces;
 }
 
+// Beyond about 40 speeds and twists a step along the tree is cheaper than dense products.
+void choose_engine(ModelData& m) {
+    constexpr int dense_limit = 40;
+    const Method method = m.description.method;
+    if (method == Method::etd3 || (method == Method::automatic && m.states <= dense_limit)) return;
+    std::string reason;
+    m.tree = build_topology(m, reason);
+    if (!m.tree && method == Method::ark3) {
+        throw ModelError("model", m.description.name, "method", "= ark3 needs a machine without loops: " + reason);
+    }
+}
+
 void build_layout(ModelData& m) {
     StateLayout& at = m.layout;
     const int actuators = at.actuators, temperatures = at.temperatures;
@@ -347,6 +359,7 @@ Model Model::build(const Description& description, const BuildOptions& options) 
     m.structure = build_structure(m.description);
     detail::build_laws(m);
     detail::build_sizes(m);
+    detail::choose_engine(m);
     detail::build_layout(m);
     detail::build_outputs(m);
     for (const FrictionPair& pair : m.structure.pairs) m.device_names.push_back(pair.name);
@@ -357,7 +370,7 @@ Model Model::build(const Description& description, const BuildOptions& options) 
 
 double Model::step_size() const noexcept { return data_->options.step_size; }
 std::string_view Model::kernel() const noexcept { return data_->kernel.name; }
-std::string_view Model::engine() const noexcept { return "etd3"; }
+std::string_view Model::engine() const noexcept { return data_->tree ? "ark3" : "etd3"; }
 const Description& Model::description() const noexcept { return data_->description; }
 const std::vector<Signal>& Model::inputs() const noexcept { return data_->inputs; }
 const std::vector<Signal>& Model::outputs() const noexcept { return data_->outputs; }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "plant/plant.h"
 #include "plant/state_layout.h"
 #include "plant/structure.h"
+#include "plant/tree.h"
 
 namespace shiftrig::plant::detail {
 
@@ -80,6 +82,7 @@ struct ModelData {
     std::vector<int> external_force;      // per mass, −1: none
     std::vector<double> root_inertia;     // √J
     std::vector<int> translating;         // masses
+    std::unique_ptr<TreeTopology> tree;   // of the engine for long chains; none: dense modes
 
     std::vector<PairLaw> pair_laws;
     std::vector<TyreLaw> tyres;

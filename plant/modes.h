@@ -47,6 +47,7 @@ struct Mode {
     double* rates = nullptr;         // [L S̃]             panels, states × columns
     double* torques = nullptr;       // [R_z R_f]         panels, rows × columns
     StepOperators step;              // for the model's step size
+    TreeMode* tree = nullptr;        // instead of all matrices, on the engine for long chains
 };
 
 // Room that a mode and its operators take, in doubles and ints.
@@ -76,9 +77,10 @@ void build_step_operators(const ModelData& model, const Mode& mode, double lengt
 struct OperatorsData {
     explicit OperatorsData(const ModelData& model);
     std::vector<double> memory;
-    std::vector<unsigned char> bytes;
-    std::vector<int> integers;
+    std::vector<unsigned char> bytes, keys;
+    std::vector<int> integers, row_memory;
     std::vector<Mode> modes;
+    std::vector<TreeMode> trees;  // one per mode where the model has a tree
     std::uint64_t clock = 0;
     Mode* recent = nullptr;
     std::vector<unsigned char> wanted;  // key being looked up
@@ -88,6 +90,10 @@ struct OperatorsData {
     OilEffects oil;
     std::vector<HydraulicOperator> hydraulics;  // per pair
     std::int64_t lookups = 0, misses = 0;       // since construction
+
+  private:
+    void place_matrices(const ModelData& model);
+    void place_trees(const ModelData& model);
 };
 
 // The mode of these contact states, from the table or built now.

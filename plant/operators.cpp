@@ -15,30 +15,54 @@ constexpr int most_modes = 256, fewest_modes = 12;
 }  // namespace
 
 OperatorsData::OperatorsData(const ModelData& m) {
+    if (m.tree) {
+        place_trees(m);
+    } else {
+        place_matrices(m);
+    }
+    const auto key_bytes = static_cast<std::size_t>(padded(m.contact_bytes));
+    const auto rows = static_cast<std::size_t>(m.torques);
+    keys.assign(modes.size() * 2 * key_bytes, 0);
+    row_memory.assign(modes.size() * rows, 0);
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+        modes[i].key = keys.data() + i * 2 * key_bytes;
+        modes[i].bound = modes[i].key + key_bytes;
+        modes[i].rows = row_memory.data() + i * rows;
+    }
+    wanted.assign(key_bytes, 0);
+    hydraulics.resize(static_cast<std::size_t>(m.pairs));
+}
+
+void OperatorsData::place_matrices(const ModelData& m) {
     const ModeSizes sizes(m);
     const auto per_mode = static_cast<std::size_t>(sizes.doubles());
     const auto affordable = static_cast<int>(memory_budget / (8 * per_mode + 1));
-    const auto count = static_cast<std::size_t>(std::clamp(affordable, fewest_modes, most_modes));
-    memory.assign(count * per_mode, 0.);
-    const auto key_bytes = static_cast<std::size_t>(sizes.key);
-    bytes.assign(count * 2 * key_bytes, 0);
-    const auto rows = static_cast<std::size_t>(m.torques);
-    integers.assign(count * rows, 0);
-    modes.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        Mode& mode = modes[i];
-        double* at = memory.data() + i * per_mode;
+    modes.resize(static_cast<std::size_t>(std::clamp(affordable, fewest_modes, most_modes)));
+    memory.assign(modes.size() * per_mode, 0.);
+    double* at = memory.data();
+    for (Mode& mode : modes) {
         mode.basis = at;
         mode.mobility = mode.basis + sizes.basis;
         mode.rates = mode.mobility + sizes.mobility;
         mode.torques = mode.rates + sizes.rates;
         mode.step = place_operators(m, mode.torques + sizes.torques);
-        mode.key = bytes.data() + i * 2 * key_bytes;
-        mode.bound = mode.key + key_bytes;
-        mode.rows = integers.data() + i * rows;
+        at += per_mode;
     }
-    wanted.assign(key_bytes, 0);
-    hydraulics.resize(static_cast<std::size_t>(m.pairs));
+}
+
+// A long chain keeps few modes: building one costs no more than a step.
+void OperatorsData::place_trees(const ModelData& m) {
+    const TreeSizes sizes(m);
+    modes.resize(fewest_modes);
+    trees.resize(modes.size());
+    memory.assign(modes.size() * sizes.doubles, 0.);
+    integers.assign(modes.size() * sizes.integers, 0);
+    bytes.assign(modes.size() * sizes.bytes, 0);
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+        place_tree(m, trees[i], memory.data() + i * sizes.doubles, integers.data() + i * sizes.integers,
+                   bytes.data() + i * sizes.bytes);
+        modes[i].tree = &trees[i];
+    }
 }
 
 Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* contact,
@@ -61,8 +85,12 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
     }
     ++o.misses;
     std::memcpy(oldest->key, o.wanted.data(), bytes);
-    build_mode(m, *oldest, scratch.workspace.data(), scratch.workspace_index.data());
-    build_step_operators(m, *oldest, m.options.step_size, oldest->step, scratch.workspace.data());
+    if (m.tree) {
+        build_tree_mode(m, *oldest);
+    } else {
+        build_mode(m, *oldest, scratch.workspace.data(), scratch.workspace_index.data());
+        build_step_operators(m, *oldest, m.options.step_size, oldest->step, scratch.workspace.data());
+    }
     oldest->last_use = ++o.clock;
     o.recent = oldest;
     return *oldest;

@@ -1,6 +1,7 @@
 // One step of the plant. [Algin] Fig. 10, with the state changes of eq. (12), (13) found inside the step.
 #include <algorithm>
 
+#include "plant/ark3.h"
 #include "plant/etd3.h"
 #include "plant/finish.h"
 #include "plant/forces.h"
@@ -23,8 +24,18 @@ double next_split(const Work& w, double from) SHIFTRIG_REALTIME {
     for (const PairLoad& load : w.scratch.loads) consider(load.hydraulic.filled_from);
     const std::vector<double>& times = w.model.breakpoints;
     const auto first = std::upper_bound(times.begin(), times.end(), w.start + from * w.h);
-    for (auto time = first; time != times.end() && *time < w.start + w.h; ++time) consider((*time - w.start) / w.h);
+    for (auto time = first; time != times.end() && *time < w.start + w.h; ++time)
+        consider((*time - w.start) / w.h);
     return split;
+}
+
+// The engine for long chains, or the one for everything else.
+void integrate(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
+    if (mode.tree) {
+        advance_tree(w, mode, end_fraction);
+    } else {
+        advance(w, mode, end_fraction);
+    }
 }
 
 }  // namespace
@@ -47,17 +58,18 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     for (double done = 0; done < 1;) {
         // Advance over what is left, up to the next jump of a law.
         const double until = next_split(w, done);
-        advance(w, *mode, until);
+        integrate(w, *mode, until);
 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
         Crossing first = first_crossing(w, *mode, s.begin, s.end);
-        const bool inside = first.device >= 0 && localise && outputs.certificate.events < m.description.maximum_events;
+        const bool inside =
+            first.device >= 0 && localise && outputs.certificate.events < m.description.maximum_events;
         double reached = until;
         if (inside && first.theta * (until - done) < instant) {
             reached = done;
         } else if (inside && first.theta < 1 - instant) {
             reached = done + first.theta * (until - done);
-            advance(w, *mode, reached);
+            integrate(w, *mode, reached);
         }
 
         // Energy ledger of the accepted part.
@@ -80,8 +92,8 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     finish_step(w, *mode);
 }
 
-void observe(const Model& model, Operators& operators, const State& state, const Inputs& inputs, Outputs& outputs,
-             Scratch& scratch) SHIFTRIG_REALTIME {
+void observe(const Model& model, Operators& operators, const State& state, const Inputs& inputs,
+             Outputs& outputs, Scratch& scratch) SHIFTRIG_REALTIME {
     Work w = begin_look(model.data(), operators.data(), state, outputs, scratch.data());
     latch_inputs(w, inputs);
     hold_actuation(w);

@@ -166,18 +166,15 @@ double reduced_motion(const Work& w, const Mode& mode, const Links& links, doubl
     return rest < 1e-9 * length ? 0 : rest;
 }
 
-// Everything at rest that moves if mesh `leader` moves is one family: it is let go together, each member
-// with the sign that the motion gives it. Released if, going one way with its own consistent losses, the
-// family accelerates that way. Returns true if it went.
-bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
+// Everything at rest that moves if mesh `leader` moves is one family: part = ±1 turning with or against the
+// leader, 0 others. Returns 1/√(reduced inertia) of its motion, 0 if others hold it.
+double find_family(Work& w, const Mode& mode, int leader, signed char* part) {
+    if (mode.tree) return tree_family(w, mode, leader, part);
     const ModelData& m = w.model;
-    ScratchData& scratch = w.scratch;
-    double* lead = scratch.vector_a.data();
-    double* member = scratch.vector_b.data();
+    double* lead = w.scratch.vector_a.data();
+    double* member = w.scratch.vector_b.data();
     const double mobility = reduced_motion(w, mode, mesh_of(w, leader).motion(), lead);
-    if (mobility == 0) return false;
-    // +1, −1: in the family, turning with or against the leader; 0: not in it.
-    signed char* part = scratch.family.data();
+    if (mobility == 0) return 0;
     const auto relation = [&](const std::array<Link, 2>& links) -> signed char {
         const double size = reduced_motion(w, mode, links, member);
         if (size == 0) return 0;
@@ -191,6 +188,17 @@ bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
         const bool candidate = mesh_of(w, k).lossy() && w.contact[m.pairs + k] == stuck;
         part[m.pairs + k] = candidate ? relation(mesh_of(w, k).motion()) : static_cast<signed char>(0);
     }
+    return mobility;
+}
+
+// A family is let go together, each member with the sign that the motion gives it. Released if, going one
+// way with its own consistent losses, the family accelerates that way. Returns true if it went.
+bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
+    const ModelData& m = w.model;
+    ScratchData& scratch = w.scratch;
+    signed char* part = scratch.family.data();
+    const double mobility = find_family(w, mode, leader, part);
+    if (mobility == 0) return false;
 
     const double threshold = 1e-10 * torque_scale(w, s) * mobility * mobility;
     const double needed = s.torque[m.pairs + m.meshes + leader];
@@ -296,25 +304,31 @@ void log_event(Work& w, EventKind kind, int device, double time, double torque, 
 }
 
 void sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    if (mode.tree) return tree_sample_rate(w, mode, s);
     const ModelData& m = w.model;
     m.kernel.multiply(mode.rates, m.states_padded / panel_rows, m.columns, s.z, nullptr, s.rate);
 }
 
 double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    double* momentum = w.scratch.vector_a.data();
-    double* joined = w.scratch.vector_b.data();
-    double before = 0, after = 0;
-    for (int j = 0; j < m.masses; ++j) {
-        momentum[j] = m.structure.inertia[static_cast<std::size_t>(j)] * speeds[j];
-        before += 0.5 * momentum[j] * speeds[j];
+    const auto kinetic_energy = [&] {
+        double energy = 0;
+        for (int j = 0; j < m.masses; ++j) {
+            energy += 0.5 * m.structure.inertia[static_cast<std::size_t>(j)] * speeds[j] * speeds[j];
+        }
+        return energy;
+    };
+    const double before = kinetic_energy();
+    if (mode.tree) {
+        tree_join(w, mode, speeds);
+    } else {
+        double* momentum = w.scratch.vector_a.data();
+        double* joined = w.scratch.vector_b.data();
+        for (int j = 0; j < m.masses; ++j) momentum[j] = m.structure.inertia[static_cast<std::size_t>(j)] * speeds[j];
+        m.kernel.multiply(mode.mobility, padded(m.masses) / panel_rows, m.masses, momentum, nullptr, joined);
+        std::copy(joined, joined + m.masses, speeds);
     }
-    m.kernel.multiply(mode.mobility, padded(m.masses) / panel_rows, m.masses, momentum, nullptr, joined);
-    for (int j = 0; j < m.masses; ++j) {
-        speeds[j] = joined[j];
-        after += 0.5 * m.structure.inertia[static_cast<std::size_t>(j)] * speeds[j] * speeds[j];
-    }
-    return before - after;
+    return before - kinetic_energy();
 }
 
 Mode& settle(Work& w, Sample& s) SHIFTRIG_REALTIME {

@@ -12,9 +12,10 @@ Description coupled_clutches() {
     d.name = "CoupledClutches";
     d.masses = {mass("J1", 1, 10), mass("J2", 1), mass("J3", 1), mass("J4", 1)};
     // cos(0.4 π t) on [0, 1.25 s): a sine of 0.2 Hz a quarter turn early.
-    d.clutches = {clutch("clutch1", "J1", "J2", 10, 1.1, ActuationDirect{sine(1, 0.2, -1e300, 1.25, -1.25), 0}),
-                  clutch("clutch2", "J2", "J3", 10, 1.1, ActuationDirect{constant(1, 0.4), 0}),
-                  clutch("clutch3", "J3", "J4", 10, 1.1, ActuationDirect{constant(1, 0.9), 0})};
+    d.clutches = {
+        clutch("clutch1", "J1", "J2", 10, 1.1, ActuationDirect{sine(1, 0.2, -1e300, 1.25, -1.25), 0}),
+        clutch("clutch2", "J2", "J3", 10, 1.1, ActuationDirect{constant(1, 0.4), 0}),
+        clutch("clutch3", "J3", "J4", 10, 1.1, ActuationDirect{constant(1, 0.9), 0})};
     d.sources = {source("J1", sine(10, 5))};
     return d;
 }
@@ -71,16 +72,31 @@ void compare(Rig& rig, const std::string& file, double h, std::vector<Comparison
     }
 }
 
-class StepSize : public ::testing::TestWithParam<double> {};
-INSTANTIATE_TEST_SUITE_P(OneAndTwoMilliseconds, StepSize, ::testing::Values(1e-3, 2e-3));
+struct Case {
+    double h;
+    Method method;
+};
+Description with(Description d, Method method) {
+    d.method = method;
+    return d;
+}
 
-TEST_P(StepSize, CoupledClutchesFollowTheReference) {
-    Rig rig(coupled_clutches(), {GetParam(), KernelKind::automatic});
+class BothEngines : public ::testing::TestWithParam<Case> {};
+INSTANTIATE_TEST_SUITE_P(OneAndTwoMilliseconds, BothEngines,
+                         ::testing::Values(Case{1e-3, Method::etd3}, Case{2e-3, Method::etd3},
+                                           Case{1e-3, Method::ark3}, Case{2e-3, Method::ark3}),
+                         [](const auto& test) {
+                             return std::string(test.param.method == Method::etd3 ? "etd3_" : "ark3_") +
+                                    (test.param.h > 1.5e-3 ? "2ms" : "1ms");
+                         });
+
+TEST_P(BothEngines, CoupledClutchesFollowTheReference) {
+    Rig rig(with(coupled_clutches(), GetParam().method), {GetParam().h, KernelKind::automatic});
     std::vector<Comparison> c = {{"mass.J1.speed", "J1.w"},
                                  {"clutch.clutch1.slip", "clutch1.w_rel", -1},
                                  {"clutch.clutch2.slip", "clutch2.w_rel", -1},
                                  {"clutch.clutch3.slip", "clutch3.w_rel", -1}};
-    compare(rig, "CoupledClutches.csv", GetParam(), c);
+    compare(rig, "CoupledClutches.csv", GetParam().h, c);
     EXPECT_LT(c[0].worst, 3 * 6.6e-5);
     EXPECT_LT(c[1].worst, 3 * 6.6e-5);
     EXPECT_LT(c[2].worst, 3 * 1.5e-7);
@@ -89,9 +105,10 @@ TEST_P(StepSize, CoupledClutchesFollowTheReference) {
     // Momentum: Σω(1.5 s) = 10 + 2/π, whatever the clutches do.
     double sum = 0;
     for (double speed : rig.state.speeds()) sum += speed;
-    EXPECT_NEAR(sum, 10 + 2 / pi, 2e3 * std::pow(GetParam(), 4));  // quadrature of the sine, order 4
+    EXPECT_NEAR(sum, 10 + 2 / pi, 2e3 * std::pow(GetParam().h, 4));  // quadrature of the sine, order 4
     const auto lock1 = rig.times(EventKind::lock, "clutch1"), lock2 = rig.times(EventKind::lock, "clutch2"),
-               lock3 = rig.times(EventKind::lock, "clutch3"), open1 = rig.times(EventKind::break_away, "clutch1");
+               lock3 = rig.times(EventKind::lock, "clutch3"),
+               open1 = rig.times(EventKind::break_away, "clutch1");
     ASSERT_EQ(lock1.size(), 2u);
     ASSERT_EQ(lock2.size(), 1u);
     ASSERT_EQ(lock3.size(), 1u);
@@ -104,24 +121,31 @@ TEST_P(StepSize, CoupledClutchesFollowTheReference) {
     EXPECT_NEAR(lock3[0], 1.1439696, 1.3e-5);
 }
 
-TEST_P(StepSize, FrictionFollowsTheReference) {
-    Rig rig(friction(), {GetParam(), KernelKind::automatic});
+TEST_P(BothEngines, FrictionFollowsTheReference) {
+    Rig rig(with(friction(), GetParam().method), {GetParam().h, KernelKind::automatic});
     std::vector<Comparison> c = {{"mass.J3.speed", "inertia3.w"},
                                  {"clutch.clutch.slip", "clutch.w_rel", -1},
                                  {"shaft.spring.twist", "spring.phi_rel", -1}};
-    compare(rig, "Friction.csv", GetParam(), c);
-    EXPECT_LT(c[0].worst, 4e-4);  // the reference's own agreement
-    EXPECT_LT(c[1].worst, 4e-4);
-    EXPECT_LT(c[2].worst, 3 * 1e-5);
+    compare(rig, "Friction.csv", GetParam().h, c);
+    // ARK3 is not exact in the spring: at 2 ms its order allows eight times what it reaches at 1 ms.
+    const double looser = GetParam().method == Method::ark3 && GetParam().h > 1.5e-3 ? 8 : 1;
+    EXPECT_LT(c[0].worst, looser * 4e-4);  // the reference's own agreement
+    EXPECT_LT(c[1].worst, looser * 4e-4);
+    EXPECT_LT(c[2].worst, looser * 3 * 1e-5);
     EXPECT_EQ(rig.fall_backs, 0);
 }
 
-TEST(Reference, LossyGearSticksAndReleasesAsTheReference) {
-    Rig rig(lossy_gear());
+// Releases act at the start of a step, so the bounds are for 1 ms.
+class EachEngine : public ::testing::TestWithParam<Method> {};
+INSTANTIATE_TEST_SUITE_P(Methods, EachEngine, ::testing::Values(Method::etd3, Method::ark3));
+
+TEST_P(EachEngine, LossyGearSticksAndReleasesAsTheReference) {
+    Rig rig(with(lossy_gear(), GetParam()));
     std::vector<Comparison> c = {{"mass.J2.speed", "Inertia2.w"}};
     compare(rig, "LossyGearDemo1.csv", 1e-3, c);
     EXPECT_LT(c[0].worst, 3 * 2.7e-6);
-    const auto sticks = rig.times(EventKind::mesh_sticks, "gear"), moves = rig.times(EventKind::mesh_releases, "gear");
+    const auto sticks = rig.times(EventKind::mesh_sticks, "gear"),
+               moves = rig.times(EventKind::mesh_releases, "gear");
     ASSERT_EQ(sticks.size(), 2u);
     ASSERT_EQ(moves.size(), 3u);  // at the start as well
     EXPECT_NEAR(sticks[0], 0.0804771, 4.5e-6);

@@ -1,0 +1,19 @@
+// The implicit–explicit Runge–Kutta step of order 3, ARK3(2)4L[2]SA of [Kennedy], on the tree of rigid groups (tree.h):
+// for long chains, where one step must cost O(N). L-stable in the shafts, explicit in the forces. Internal.
+#pragma once
+
+#include "plant/forces.h"
+
+namespace shiftrig::plant::detail {
+
+// The diagonal of its implicit table: the stage matrix is M + hγ D + (hγ)² K.
+inline constexpr double ark3_gamma = 1767732205903. / 4055673282236;
+
+// As advance() of etd3.h: from the settled `begin` to `end_fraction` of the step in the mode; fills end, with forces
+// and internal torques, and half where a locked pair is overloaded at the end.
+void advance_tree(Work& work, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME;
+
+// Doubles of working memory it needs in ScratchData::workspace.
+int tree_workspace_doubles(const ModelData& model) noexcept;
+
+}  // namespace shiftrig::plant::detail
