@@ -34,10 +34,12 @@ Bus::Bus(const std::string& name, const io::can::Mapping* mapping, io::SignalTab
     }
     if (!name.starts_with("can:") && !name.starts_with("udpcan:"))
         throw io::InputError("bus " + name + ": unknown kind; it is inprocess, can:INTERFACE, udpcan:GROUP:PORT or lcm:URL");
-    const auto can = can_options(options);
+    auto can = can_options(options);
+    can.address_claim = io::can::AddressClaim::claim;
     owned_ = io::can::open_port(name, io::can::filters_of(*mapping, can.role));
     port_ = owned_.get();
     can_.emplace(*mapping, *port_, signals, can);
+    can_->claim_addresses();
 }
 
 Bus::Bus(const std::string& name, io::can::CanPort& port, const io::can::Mapping& mapping, io::SignalTable& signals,

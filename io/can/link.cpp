@@ -1,6 +1,7 @@
 #include "io/can/link.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "io/can/link_data.h"
@@ -197,6 +198,34 @@ void CanLink::Data::supervise(std::int64_t now_ns, SignalTable& signals) SHIFTRI
     signals.value[static_cast<std::size_t>(valid_index)] = valid ? 1 : 0;
 }
 
+// What came in several frames, and what somebody asks us to send.
+void CanLink::Data::hear_network(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME {
+    j1939::LongMessage message;
+    while (network->transport.next(message)) {
+        Frame whole;
+        if (message.length > whole.data.size()) continue;
+        whole.extended = true;
+        whole.id = (6U << 26) | (message.pgn << 8) | message.source;
+        if (is_pdu1(whole.id)) whole.id |= std::uint32_t{message.destination} << 8;
+        whole.length = static_cast<std::uint8_t>(message.length);
+        std::copy_n(message.data.begin(), message.length, whole.data.begin());
+        take(whole, now_ns, signals);
+    }
+    std::uint32_t pgn = 0;
+    std::uint8_t address = 0;
+    while (network->requested(pgn, address))
+        for (auto& candidate : sent)
+            if (candidate.frame.extended && pgn_of(candidate.frame.id) == pgn &&
+                (candidate.frame.id & 0xFFU) == address)
+                candidate.requested = true;
+    for (std::size_t i = 0; i < address_index.size(); ++i) {
+        const auto claim = network->nodes()[i].claim;
+        signals.value[static_cast<std::size_t>(address_index[i])] = claim == j1939::Claim::claimed ? 1
+                                                                    : claim == j1939::Claim::lost  ? 2
+                                                                                                   : 0;
+    }
+}
+
 void CanLink::receive(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME {
     Data& d = *data_;
     if (!d.started_receiving) {
@@ -205,9 +234,13 @@ void CanLink::receive(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTI
     }
     for (int batch = 0; batch < kMostBatches; ++batch) {
         const std::size_t count = d.port->receive(now_ns, d.buffer);
-        for (std::size_t i = 0; i < count; ++i) d.take(d.buffer[i], now_ns, signals);
+        for (std::size_t i = 0; i < count; ++i) {
+            if (d.network) d.network->take(d.buffer[i], now_ns, *d.port);
+            d.take(d.buffer[i], now_ns, signals);
+        }
         if (count < d.buffer.size()) break;
     }
+    if (d.network) d.hear_network(now_ns, signals);
     d.supervise(now_ns, signals);
 }
 
@@ -252,13 +285,24 @@ void CanLink::Data::encode(SentMessage& message, const SignalTable& signals) SHI
     if (message.checksum) message.checksum->codec.put(data, message.checksum->compute(message.frame));
 }
 
+bool CanLink::Data::put_on_bus(const SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME {
+    if (!message.by_transport) return port->send(now_ns, message.frame);
+    if (!network) return false;
+    j1939::LongMessage whole;
+    whole.pgn = pgn_of(message.frame.id);
+    whole.source = static_cast<std::uint8_t>(message.frame.id);
+    whole.length = message.frame.length;
+    std::copy_n(message.frame.data.begin(), message.frame.length, whole.data.begin());
+    return network->transport.send(whole);
+}
+
 void CanLink::Data::transmit(SentMessage& message, std::int64_t now_ns,
                              const SignalTable& signals) SHIFTRIG_REALTIME {
     const int index = static_cast<int>(&message - sent.data());
     const bool answering = options.role == Role::controller && index == answer && asked_before;
     if (answering && pending) message.next_counter = question_counter;  // the answer echoes the question
     encode(message, signals);
-    if (port->send(now_ns, message.frame))
+    if (put_on_bus(message, now_ns))
         ++message.report.good;
     else
         ++message.report.send_dropped;
@@ -271,6 +315,8 @@ void CanLink::Data::transmit(SentMessage& message, std::int64_t now_ns,
 }
 
 bool CanLink::Data::due(SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME {
+    if (network && message.frame.extended && !network->may_send(static_cast<std::uint8_t>(message.frame.id)))
+        return false;
     if (message.requested) {
         message.requested = false;
         return true;
@@ -306,6 +352,7 @@ void CanLink::send(std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REA
             if (field.use == Use::travelled)
                 field.travelled += elapsed * std::fabs(signals.value[static_cast<std::size_t>(field.index)]);
 
+    if (d.network) d.network->run(now_ns, *d.port);
     // The answer goes last: when it has arrived, all of this cycle has.
     const int last = d.options.role == Role::controller ? d.answer : d.question;
     for (int i = 0; i < static_cast<int>(d.sent.size()); ++i) {
@@ -334,7 +381,28 @@ bool CanLink::awaiting_answer() const SHIFTRIG_REALTIME {
 bool CanLink::question_pending() const SHIFTRIG_REALTIME {
     return data_->pending;
 }
-void CanLink::set_fault(std::uint32_t, std::uint8_t, bool) SHIFTRIG_REALTIME {}
+void CanLink::set_fault(std::uint32_t spn, std::uint8_t fmi, bool active,
+                        std::uint8_t source) SHIFTRIG_REALTIME {
+    if (data_->network) data_->network->set_fault(spn, fmi, active, source);
+}
+
+void CanLink::claim_addresses() {
+    if (!data_->network) return;
+    const auto start = std::chrono::steady_clock::now();
+    const auto all_settled = [this] {
+        const auto& nodes = data_->network->nodes();
+        return std::all_of(nodes.begin(), nodes.end(), [](const auto& node) {
+            return node.claim == j1939::Claim::claimed || node.claim == j1939::Claim::lost;
+        });
+    };
+    for (std::int64_t now_ns = 0; !all_settled() || now_ns == 0;) {
+        data_->network->run(now_ns, *data_->port);
+        data_->port->wait(10'000'000);
+        now_ns = std::chrono::nanoseconds(std::chrono::steady_clock::now() - start).count();
+        const std::size_t count = data_->port->receive(now_ns, data_->buffer);
+        for (std::size_t i = 0; i < count; ++i) data_->network->take(data_->buffer[i], now_ns, *data_->port);
+    }
+}
 
 std::vector<MessageReport> CanLink::report() const {
     std::vector<MessageReport> result;

@@ -51,7 +51,7 @@ struct MessageReport {
 enum class AddressClaim : std::uint8_t {
     off,
     settled,  // claimed before time 0 and still defended: runs that start in motion
-    claim,    // claims at start and waits as [J1939-81] wants before it speaks
+    claim,    // claims at start (claim_addresses(), or with the first send()) and waits as [J1939-81] wants
 };
 
 struct LinkOptions {
@@ -87,8 +87,13 @@ class CanLink {
     bool awaiting_answer() const SHIFTRIG_REALTIME;
     bool question_pending() const SHIFTRIG_REALTIME;
 
-    // The rig's own faults, sent as DM1 [J1939-73] from each source address we play while active.
-    void set_fault(std::uint32_t spn, std::uint8_t fmi, bool active) SHIFTRIG_REALTIME;
+    // A fault of our own, told as DM1 [J1939-73] by the node at `source` while active (the transmission's sensors
+    // unless said otherwise).
+    void set_fault(std::uint32_t spn, std::uint8_t fmi, bool active,
+                   std::uint8_t source = 0x80) SHIFTRIG_REALTIME;
+    // With AddressClaim::claim: claims our addresses now, in wall time, and waits until they are ours or lost (at
+    // most about 0.3 s), so that the first tick may speak. Not for the loop.
+    void claim_addresses();
 
     std::vector<MessageReport> report() const;
     // Load of the bus by all mapped messages of both ends, worst-case stuffing [1]; > 1 cannot work.

@@ -42,6 +42,18 @@ std::vector<Selection> selections(const dbc::Message& layout, const dbc::Signal&
     return chain;
 }
 
+// A signal of the link itself; a second link on the same table shares it.
+int own_signal(SignalTable& signals, const std::string& name, const std::string& description,
+               double initial = 0) {
+    const int found = signals.find(name);
+    if (found >= 0) return found;
+    plant::Signal signal;
+    signal.name = name;
+    signal.initial = initial;
+    signal.description = description;
+    return signals.add(signal);
+}
+
 template <class Optional>
 double or_else(const Optional& value, double fallback) {
     return value ? *value : fallback;
@@ -54,15 +66,24 @@ CanLink::Data::Data(const Mapping& mapping, CanPort& a_port, SignalTable& signal
     : port(&a_port), options(some_options) {
     for (const auto& map : mapping.messages) {
         const dbc::Message& layout = *mapping.database.find(map.name);
-        if (layout.length > (mapping.data_bit_rate > 0 ? 64 : 8))
+        if (layout.length > (mapping.data_bit_rate > 0 || mapping.is_j1939(layout) ? 64 : 8))
             fail(mapping, map.line, map.column,
-                 "message " + map.name + " has " + std::to_string(layout.length) + " bytes; a frame holds " +
-                     (mapping.data_bit_rate > 0 ? "64" : "8, with data_bit_rate (CAN FD) 64"));
+                 "message " + map.name + " has " + std::to_string(layout.length) +
+                     " bytes; a frame holds 8, with data_bit_rate (CAN FD) or J1939's transport protocol 64");
         const bool sends = mapping.sent_by_rig(layout) == (options.role == Role::rig);
         if (sends)
             build_sent(mapping, layout, map, signals);
         else
             build_received(mapping, layout, map, signals);
+    }
+    const auto j1939 = [&mapping](const MessageMap& map) {
+        return mapping.is_j1939(*mapping.database.find(map.name));
+    };
+    if (std::any_of(mapping.messages.begin(), mapping.messages.end(), j1939)) {
+        network.emplace(mapping, options.role, options.address_claim);
+        for (const auto& node : network->nodes())
+            address_index.push_back(own_signal(signals, "bus." + node.name + ".address",
+                                               "0 waiting, 1 claimed, 2 lost to another controller"));
     }
     settle_duplicates(mapping, signals);
     build_look_up();
@@ -242,6 +263,8 @@ void CanLink::Data::build_sent(const Mapping& mapping, const dbc::Message& layou
     message.frame.length = message.frame.fd ? fd_length(static_cast<unsigned>(layout.length))
                                             : static_cast<std::uint8_t>(layout.length);
     if (mapping.is_j1939(layout)) message.frame.data.fill(0xFF);
+    message.by_transport = layout.length > 8 && !message.frame.fd;
+    if (message.by_transport) message.frame.length = static_cast<std::uint8_t>(layout.length);
     message.cycle_ns = to_ns(or_else(map.cycle_ms, layout.cycle_time_ms()));
     message.phase_ns = map.phase_ms ? to_ns(*map.phase_ms) : -1;
     if (message.cycle_ns == 0)
@@ -353,7 +376,9 @@ void CanLink::Data::judge_load(const Mapping& mapping) {
         if (cycle_ms <= 0) continue;
         double seconds =
             worst_case_classic_bits(layout.extended, std::min(layout.length, 8)) / mapping.bit_rate;
-        if (layout.length > 8) {
+        if (layout.length > 8 && mapping.data_bit_rate <= 0)
+            seconds *= 1 + (layout.length + 6) / 7;  // announcement and packets
+        if (layout.length > 8 && mapping.data_bit_rate > 0) {
             Frame frame;
             frame.extended = layout.extended;
             frame.fd = frame.bit_rate_switch = true;

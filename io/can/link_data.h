@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "io/can/codec.h"
+#include "io/can/j1939.h"
 #include "io/can/link.h"
 #include "io/can/mapping.h"
 
@@ -87,7 +88,8 @@ struct SentMessage {
     std::vector<std::uint64_t> multiplexor_values;
     std::size_t turn = 0;
     unsigned next_counter = 0;
-    bool requested = false;  // by a J1939 request: sent at the next opportunity
+    bool requested = false;     // by a J1939 request: sent at the next opportunity
+    bool by_transport = false;  // more than 8 bytes on a classic J1939 bus
 };
 
 struct CanLink::Data {
@@ -118,6 +120,8 @@ struct CanLink::Data {
     void encode(SentMessage& message, const SignalTable& signals) SHIFTRIG_REALTIME;
     void transmit(SentMessage& message, std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REALTIME;
     bool due(SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME;
+    bool put_on_bus(const SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME;
+    void hear_network(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME;
 
     CanPort* port;
     LinkOptions options;
@@ -129,6 +133,8 @@ struct CanLink::Data {
     };
     std::vector<LookUp> look_up;  // sorted by key
     std::array<Frame, 64> buffer;
+    std::optional<j1939::Network> network;
+    std::vector<int> address_index;  // signal `bus.<node>.address` of each of the network's nodes
     std::vector<std::string> warnings;
     double load = 0;
     int valid_index = -1;

@@ -11,8 +11,14 @@ shiftrig_can_test(can_codec_test)
 shiftrig_can_test(can_dbc_test)
 shiftrig_can_test(can_link_test ${CMAKE_CURRENT_LIST_DIR}/count_allocations.cpp)
 shiftrig_can_test(can_candump_test)
+shiftrig_can_test(can_j1939_test ${CMAKE_CURRENT_LIST_DIR}/count_allocations.cpp)
 
 # In a network of its own (unshare), therefore one test of ctest.
 add_executable(can_udp_test ${CMAKE_CURRENT_LIST_DIR}/can_udp_test.cpp)
 target_link_libraries(can_udp_test PRIVATE shiftrig_can GTest::gtest_main)
 add_test(NAME can_udp_test COMMAND ${CMAKE_CURRENT_LIST_DIR}/with_multicast.sh $<TARGET_FILE:can_udp_test>)
+
+add_executable(can_socketcan_test ${CMAKE_CURRENT_LIST_DIR}/can_socketcan_test.cpp)
+target_link_libraries(can_socketcan_test PRIVATE shiftrig_can GTest::gtest_main)
+add_test(NAME can_socketcan_test COMMAND can_socketcan_test)
+set_tests_properties(can_socketcan_test PROPERTIES LABELS vcan)

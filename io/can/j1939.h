@@ -1,0 +1,96 @@
+// What makes the rig a good citizen of a J1939 network: it claims and defends the addresses it plays [J1939-81],
+// answers requests [J1939-21], tells its faults (DM1, [J1939-73]) and speaks the transport protocol. Time is the
+// caller's; nothing allocates after construction.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "io/can/dbc.h"
+#include "io/can/j1939_transport.h"
+#include "io/can/link.h"
+#include "io/can/mapping.h"
+
+namespace shiftrig::io::can::j1939 {
+
+constexpr std::uint32_t kRequest = 0xEA00, kAcknowledgement = 0xE800, kAddressClaimed = 0xEE00,
+                        kTransport = 0xEC00, kTransportData = 0xEB00, kDm1 = 0xFECA,
+                        kSoftwareIdentification = 0xFEDA;
+
+// The 64-bit NAME of a controller; the lower of two wins an address.
+struct Name {
+    std::uint32_t identity = 1;      // 21 bits
+    std::uint16_t manufacturer = 0;  // 11 bits
+    std::uint8_t ecu_instance = 0, function_instance = 0, function = 0xFF, vehicle_system = 0;
+    std::uint8_t vehicle_system_instance = 0, industry_group = 0;
+    bool arbitrary_address = false;
+    std::uint64_t bits() const noexcept;
+};
+// From the attributes NmJ1939… that DBC files give their nodes.
+Name name_of(const dbc::Node& node, const Mapping& mapping);
+
+enum class Claim : std::uint8_t { unclaimed, waiting, claimed, lost };
+
+class Network {
+  public:
+    struct Node {
+        std::string name;
+        std::uint8_t address = 0;
+        std::uint64_t bits = 0;  // NAME
+        Claim claim = Claim::unclaimed;
+        std::int64_t claimed_at_ns = 0;     // when waiting ends
+        std::int64_t cannot_claim_ns = -1;  // when to say so, −1: said
+        bool announce = false;              // send the claim at the next opportunity
+    };
+
+    // The nodes whose messages this role sends.
+    Network(const Mapping& mapping, Role role, AddressClaim mode);
+
+    // Looks at every extended frame. A request for a message of ours comes out of `requested`.
+    void take(const Frame& frame, std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
+    bool requested(std::uint32_t& pgn, std::uint8_t& address) SHIFTRIG_REALTIME;
+    // Sends what is due.
+    void run(std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
+    bool may_send(std::uint8_t address) const SHIFTRIG_REALTIME;
+
+    // For all PGNs we answer by sending a message; others are answered by a negative acknowledgement.
+    void add_answer(std::uint32_t pgn, std::uint8_t address) { answers_.push_back({pgn, address}); }
+    // False if no more than 32 faults fit.
+    bool set_fault(std::uint32_t spn, std::uint8_t fmi, bool active, std::uint8_t address) SHIFTRIG_REALTIME;
+
+    const std::vector<Node>& nodes() const noexcept { return nodes_; }
+    Transport transport;
+
+  private:
+    struct Answer {
+        std::uint32_t pgn;
+        std::uint8_t address;
+    };
+    struct Fault {
+        std::uint32_t spn = 0;
+        std::uint8_t fmi = 0, address = 0, occurrences = 0;
+        bool active = false;
+    };
+    Node* node_at(std::uint8_t address) SHIFTRIG_REALTIME;
+    void hear_claim(const Frame& frame, std::int64_t now_ns) SHIFTRIG_REALTIME;
+    void hear_request(const Frame& frame, std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
+    bool answer(Node& node, std::uint32_t pgn, std::uint8_t asker, std::int64_t now_ns,
+                CanPort& port) SHIFTRIG_REALTIME;
+    void send_claim(const Node& node, std::uint8_t as, std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
+    void send_dm1(const Node& node, std::uint8_t to, std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
+
+    std::vector<Node> nodes_;
+    std::vector<Answer> answers_;
+    std::array<Fault, 32> faults_;
+    std::size_t fault_count_ = 0;
+    bool faults_told_ = false;  // DM1 must still say that there are none any more
+    bool faults_changed_ = false;
+    std::int64_t dm1_due_ns_ = INT64_MIN;
+    Ring<Answer> requests_{32};
+    AddressClaim mode_;
+    bool started_ = false;
+};
+
+}  // namespace shiftrig::io::can::j1939
