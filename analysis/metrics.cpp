@@ -266,12 +266,14 @@ class Meter {
         }
         return true;
     }
-    // Clutches of this shift always; others only if they took heat in it.
+    // Clutches of this shift always; others only if they took heat in it, other than the drag of open plates.
     bool worth_telling(const std::string& name) const {
         const auto in = [&name](const std::vector<std::string>& list) {
             return std::find(list.begin(), list.end(), name) != list.end();
         };
-        return in(shift_.oncoming) || in(shift_.offgoing) || rise("clutch." + name + ".heat").value_or(0) > 1;
+        if (in(shift_.oncoming) || in(shift_.offgoing)) return true;
+        const bool engaged = greatest("clutch." + name + ".capacity").value_or(1) > 0;
+        return engaged && rise("clutch." + name + ".heat").value_or(0) > 1;
     }
     // x(t_s) − x(t_a).
     Value rise(const std::string& signal) const {

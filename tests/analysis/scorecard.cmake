@@ -1,4 +1,4 @@
-foreach(subject filter shifts metrics scorecard compare)
+foreach(subject filter shifts metrics scorecard compare plot)
   add_executable(analysis_${subject}_test ${CMAKE_CURRENT_LIST_DIR}/${subject}_test.cpp)
   target_link_libraries(analysis_${subject}_test PRIVATE shiftrig_analysis GTest::gtest_main)
   target_compile_definitions(analysis_${subject}_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")

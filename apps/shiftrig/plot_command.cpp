@@ -1,0 +1,97 @@
+// shiftrig plot: a shift, or any stretch of a recording, as a picture for documents.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iostream>
+#include <memory>
+
+#include "analysis/load_run.h"
+#include "analysis/plot.h"
+#include "apps/shiftrig/command.h"
+
+namespace shiftrig::cli {
+
+namespace {
+
+struct Options {
+    std::string recording, output;
+    int shift = 1;
+    double from = -1, until = -1;
+    int width = 900;
+};
+
+bool ends_with(const std::string& text, const std::string& ending) {
+    return text.size() >= ending.size() &&
+           text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
+}
+
+// rsvg-convert (Debian: librsvg2-bin) turns the SVG into pixels; its words go to our stderr.
+void convert(const std::string& svg, const std::string& png) {
+    const pid_t child = fork();
+    if (child == 0) {
+        execlp("rsvg-convert", "rsvg-convert", "--zoom", "1.6", "--format", "png", "--output", png.c_str(),
+               svg.c_str(), nullptr);
+        std::cerr << "rsvg-convert: " << std::strerror(errno) << " (Debian: sudo apt install librsvg2-bin)\n";
+        _exit(127);
+    }
+    int status = 0;
+    if (child < 0 || waitpid(child, &status, 0) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+        throw std::runtime_error(png + ": could not be made from " + svg);
+    }
+}
+
+analysis::Plot plot_of(const analysis::Run& run, const Options& options) {
+    if (run.time.size() < 2) throw std::runtime_error(options.recording + ": fewer than two ticks");
+    if (options.from >= 0 || options.until >= 0) {
+        const double until = options.until >= 0 ? options.until : run.time.back();
+        if (until <= options.from) throw std::runtime_error("--until must be later than --from");
+        return analysis::plot_of_stretch(run, std::max(options.from, 0.0), until);
+    }
+    const std::vector<analysis::Shift> shifts = analysis::find_shifts(run);
+    if (shifts.empty()) return analysis::plot_of_stretch(run, run.time.front(), run.time.back());
+    if (options.shift > static_cast<int>(shifts.size())) {
+        throw std::runtime_error(options.recording + ": only " + std::to_string(shifts.size()) +
+                                 " shifts in it");
+    }
+    return analysis::plot_of_shift(run, shifts[static_cast<std::size_t>(options.shift - 1)]);
+}
+
+int run(const Options& options) {
+    const bool png = ends_with(options.output, ".png");
+    if (!png && !ends_with(options.output, ".svg")) throw std::runtime_error("-o: must end in .svg or .png");
+    const std::string svg =
+        analysis::to_svg(plot_of(analysis::load_run(options.recording), options), options.width);
+    const std::string path = png ? options.output + ".svg" : options.output;
+    std::ofstream file(path);
+    file << svg;
+    file.close();
+    if (!file) throw std::runtime_error(path + ": cannot be written");
+    if (png) {
+        convert(path, options.output);
+        unlink(path.c_str());
+    }
+    return good;
+}
+
+Command::Run declare(CLI::App& app) {
+    auto options = std::make_shared<Options>();
+    app.add_option("RECORDING", options->recording, "of shiftrig run --record")->required();
+    app.add_option("-o,--output", options->output, "picture, .svg or .png")->required();
+    app.add_option("--shift", options->shift, "which shift of the recording, from 1")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--from", options->from, "instead of a shift: from this time on [s]")
+        ->check(CLI::NonNegativeNumber);
+    app.add_option("--until", options->until, "until this time [s]")->check(CLI::NonNegativeNumber);
+    app.add_option("--width", options->width, "[px]")->check(CLI::Range(300, 4000))->capture_default_str();
+    return [options] { return run(*options); };
+}
+
+const Command plot("plot", "a shift, or any stretch of a recording, as a picture", declare);
+
+}  // namespace
+
+}  // namespace shiftrig::cli
