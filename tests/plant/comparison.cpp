@@ -116,8 +116,10 @@ double violation_of(const Description& d, const Model& model, const Outputs& out
     return worst;
 }
 
-PlantRun run_plant(const Description& d, const Table& layout, std::uint64_t seed, double seconds) {
-    const Model model = Model::build(d, {.step_size = 1e-3, .kernel = KernelKind::automatic});
+PlantRun run_plant(const Description& d, const Table& layout, std::uint64_t seed,
+                   const ComparisonOptions& options) {
+    const Model model =
+        Model::build(d, {.step_size = 1e-3 / options.steps_per_sample, .kernel = KernelKind::automatic});
     Operators operators(model), twin_operators(model);
     State state(model), twin(model);
     Scratch scratch(model), twin_scratch(model);
@@ -144,7 +146,7 @@ PlantRun run_plant(const Description& d, const Table& layout, std::uint64_t seed
     bool finite = true, same = true, flagged = true;
     const double stored_at_start = output("energy.stored");
     double moved = stored_at_start;
-    const int steps = static_cast<int>(std::lround(seconds / 1e-3));
+    const int steps = static_cast<int>(std::lround(options.seconds / 1e-3)) * options.steps_per_sample;
     for (int k = 0; k < steps; ++k) {
         step(model, operators, state, inputs, outputs, scratch);
         // The same from forgotten operators and a scratch full of NaN: not a bit may differ.
@@ -152,7 +154,7 @@ PlantRun run_plant(const Description& d, const Table& layout, std::uint64_t seed
         twin_scratch.fill_with_nan();
         step(model, twin_operators, twin, inputs, twin_outputs, twin_scratch);
         same = same && std::memcmp(state.bytes().data(), twin.bytes().data(), state.bytes().size()) == 0;
-        record();
+        if ((k + 1) % options.steps_per_sample == 0) record();
         for (const double v : run.table.rows.back()) finite = finite && std::isfinite(v);
         for (const auto& m : d.masses)
             fastest = std::max(
@@ -237,7 +239,7 @@ Comparison compare(const RandomSystem& system, std::uint64_t seed, const Compari
     const Result truth = run_reference(d, options);
     result.seconds_reference = clock() - begin;
     const Table layout = table_of(d, truth);
-    const PlantRun run = run_plant(d, layout, seed, options.seconds);
+    const PlantRun run = run_plant(d, layout, seed, options);
     result.broken = run.broken;
     result.fall_backs = run.fall_backs;
     result.events = run.events;

@@ -11,6 +11,7 @@ namespace shiftrig {
 
 struct ComparisonOptions {
     double seconds = 0.2;
+    int steps_per_sample = 1;    // plant steps per millisecond
     double tolerance = 1e-4;     // of a signal's range
     double range_floor = 1e-3;   // a range counts as at least this share of the largest of its unit
     double perturbation = 1e-9;  // relative, on speeds, capacities and torques

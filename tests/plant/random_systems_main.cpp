@@ -23,8 +23,10 @@ struct Arguments {
 };
 
 const char usage[] =
-    "usage: shiftrig_random_systems [--count N] [--seed S] [--seconds T] [--jobs J] [--verbose]\n"
-    "  systems S … S+N−1, each simulated for T seconds at 1 ms; --verbose prints each that does not agree\n";
+    "usage: shiftrig_random_systems [--count N] [--seed S] [--seconds T] [--jobs J] [--substeps K] "
+    "[--verbose]\n"
+    "  systems S … S+N−1, each simulated for T seconds at 1 ms / K; --verbose prints each that does not "
+    "agree\n";
 
 bool parse(int argc, char** argv, Arguments& a) {
     for (int i = 1; i < argc; ++i) {
@@ -41,6 +43,8 @@ bool parse(int argc, char** argv, Arguments& a) {
             a.seed = std::strtoull(value, nullptr, 10);
         else if (key == "--seconds")
             a.options.seconds = std::atof(value);
+        else if (key == "--substeps")
+            a.options.steps_per_sample = std::atoi(value);
         else if (key == "--jobs")
             a.jobs = std::atol(value);
         else

@@ -16,7 +16,11 @@ namespace shiftrig::plant {
 
 struct Rig {
     explicit Rig(const Description& description, const BuildOptions& options = {})
-        : model(Model::build(description, options)), operators(model), state(model), scratch(model), inputs(model),
+        : model(Model::build(description, options)),
+          operators(model),
+          state(model),
+          scratch(model),
+          inputs(model),
           outputs(model) {}
 
     double& in(const std::string& name) { return inputs.value[at(model.input(name), name)]; }
@@ -71,7 +75,8 @@ inline std::map<std::string, std::vector<double>> read_reference(const std::stri
     std::map<std::string, std::vector<double>> columns;
     while (std::getline(file, line)) {
         std::istringstream row(line);
-        for (std::size_t i = 0; std::getline(row, cell, ','); ++i) columns[header[i]].push_back(std::stod(cell));
+        for (std::size_t i = 0; std::getline(row, cell, ','); ++i)
+            columns[header[i]].push_back(std::stod(cell));
     }
     return columns;
 }
