@@ -344,6 +344,7 @@ Sample Solver::sample(When when) {
     s.z = z;
     s.mode = mode;
     s.friction_torque = work_.friction;
+    bool resting = false;
     for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
         const double sign = sign_of(mode.friction[f]);
         if (sign != 0) {
@@ -361,7 +362,7 @@ Sample Solver::sample(When when) {
     s.input = energy_.input;
     s.dissipated = energy_.dissipated;
     s.stored = stored_energy();
-    s.unique = responses_.of(mode).redundancy == 0 && responses_.of(mode).sound;
+    s.unique = !resting && responses_.of(mode).redundancy == 0 && responses_.of(mode).sound;
     for (std::size_t m = 0; m < system_.meshes.size(); ++m)
         if (mode.at_rest[m] && mode.mesh[m] != Hold::held) s.unique = false;
     return s;
