@@ -1,6 +1,6 @@
 # The independent solver, its own proof, and what it proves about the plant.
 add_library(shiftrig_reference STATIC plant/reference/system.cpp plant/reference/modes.cpp plant/reference/solver.cpp
-            plant/reference/cases.cpp plant/reference/curves.cpp)
+            plant/reference/cases.cpp plant/reference/curves.cpp plant/reference/tractor.cpp)
 target_link_libraries(shiftrig_reference PUBLIC shiftrig_options Eigen3::Eigen)
 
 add_executable(reference_solver_test plant/reference/solver_test.cpp)
@@ -8,9 +8,13 @@ target_link_libraries(reference_solver_test PRIVATE shiftrig_reference GTest::gt
 target_compile_definitions(reference_solver_test PRIVATE SHIFTRIG_DATA="${CMAKE_SOURCE_DIR}/tests/data")
 gtest_discover_tests(reference_solver_test)
 
-add_library(shiftrig_comparison STATIC plant/random_systems.cpp plant/comparison.cpp)
+add_library(shiftrig_comparison STATIC plant/random_systems.cpp plant/comparison.cpp plant/tractor_comparison.cpp)
 target_link_libraries(shiftrig_comparison PUBLIC shiftrig_reference shiftrig_plant)
 
 # Thousands by hand: shiftrig_random_systems --count 10000 --seed 1 --seconds 0.2 --jobs 2
 add_executable(shiftrig_random_systems plant/random_systems_main.cpp)
 target_link_libraries(shiftrig_random_systems PRIVATE shiftrig_comparison Threads::Threads)
+
+add_executable(tractor_shift_test plant/tractor_shift_test.cpp)
+target_link_libraries(tractor_shift_test PRIVATE shiftrig_comparison GTest::gtest_main)
+gtest_discover_tests(tractor_shift_test)

@@ -443,9 +443,8 @@ Result Solver::run(double until, const Options& options) {
     const double largest = std::min(options.step, options.resolution / std::max(result.fastest_rate, 1e-9));
     const auto grid_points = static_cast<long>(std::lround(until / options.grid));
     std::size_t next_break = 0;
-    long next_grid = 1;
-    double t = 0;
-    bool first = true;
+    double t = time_;
+    long next_grid = std::lround(t / options.grid) + 1;
     Vector end;
     Energy energy;
     int events = 0;
@@ -455,10 +454,10 @@ Result Solver::run(double until, const Options& options) {
         if (next_break < system_.breaks.size() && system_.breaks[next_break] < stop - 1e-12)
             stop = system_.breaks[next_break];
         const double inside = (t + stop) / 2;
-        if (first) {
+        if (!begun_) {
             begin(inside);
             result.samples.push_back(sample({0, inside}));
-            first = false;
+            begun_ = true;
         } else {
             settle({t, inside});  // laws may have jumped
         }
@@ -497,6 +496,7 @@ Result Solver::run(double until, const Options& options) {
             ++next_grid;
         }
     }
+    time_ = t;
     result.changes = changes;
     result.unresolved = unresolved;
     return result;

@@ -13,7 +13,7 @@ struct Options {
     double step = 5e-6;        // largest step [s]; refined where the machine is stiffer
     double resolution = 0.05;  // step·(fastest rate) stays below this
     double grid = 1e-3;        // [s] of the samples
-    int event_limit = 2000;   // beyond it the run is given up as chattering
+    int event_limit = 2000;    // beyond it the run is given up as chattering
 };
 
 struct Change {
@@ -43,6 +43,7 @@ class Solver {
   public:
     explicit Solver(const System& system);
 
+    // Continues where the last run ended; the first begins at time 0 and samples it too.
     Result run(double until, const Options& options);
     // The pieces, for integrators of another kind: mode at an instant, rates in a mode, margins of a mode.
     void begin(double inside);
@@ -85,6 +86,8 @@ class Solver {
     double fastest_rate();
 
     const System& system_;
+    double time_ = 0;
+    bool begun_ = false;
     Responses responses_;
     Torques work_;
     Energy energy_;
