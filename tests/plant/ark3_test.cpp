@@ -1,0 +1,232 @@
+// The engine for long chains against the dense one: the same torques and rates at an instant to rounding, the same
+// motion to the order of the methods, on random forests of shafts, dampers, clutches, brakes and lossy gears.
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include "rig.h"
+
+namespace shiftrig::plant {
+namespace {
+
+Gear lossy_gear(const std::string& name, const std::string& a, const std::string& b, double ratio,
+                double efficiency, double bearing) {
+    Gear gear;
+    gear.name = name;
+    gear.a = a;
+    gear.b = b;
+    gear.ratio = ratio;
+    gear.efficiency = efficiency;
+    gear.bearing_torque = bearing;
+    return gear;
+}
+
+struct Forest {
+    explicit Forest(std::uint64_t seed) : random(seed) {}
+    std::mt19937_64 random;
+    double real(double a, double b) { return a + (b - a) * static_cast<double>(random() >> 11) * 0x1p-53; }
+    int below(int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); }
+
+    Description build(bool losses) {
+        Description d;
+        d.name = "forest";
+        const int n = 3 + below(12);
+        for (int j = 0; j < n; ++j) {
+            d.masses.push_back(mass("m" + std::to_string(j), std::pow(10, real(-1, 1)), 0));
+            if (j == 0) continue;
+            const int parent = real(0, 1) < 0.6 ? j - 1 : below(j);
+            const std::string a = "m" + std::to_string(parent), b = "m" + std::to_string(j), name = "d" + b;
+            const bool turned = below(2) == 1;
+            const std::string &first = turned ? b : a, &second = turned ? a : b;
+            const double kind = real(0, 1);
+            if (kind < 0.4) {
+                d.shafts.push_back({name, first, second, real(100, 3000), real(0, 5), 0});
+                if (below(4) == 0) d.dampers.push_back({name + "d", second, first, real(0.1, 2)});
+            } else if (kind < 0.7) {
+                const double f = real(0.3, 1.5);
+                d.clutches.push_back(clutch(name, first, second, real(20, 200), 1 + below(2) * 0.15,
+                                            ActuationDirect{sine(1, f, -1e300, 1e300, real(0, 1)), 0}));
+            } else if (kind < 0.95) {
+                const double efficiency = losses ? real(0.6, 1) : 1;
+                d.gears.push_back(lossy_gear(name, first, second, (below(3) == 0 ? -1 : 1) * real(0.4, 2.5),
+                                             efficiency, losses && below(3) == 0 ? real(0.1, 2) : 0));
+            } else {
+                d.dampers.push_back({name, first, second, real(0.5, 5)});
+            }
+        }
+        for (int j = 0; j < n; ++j) {
+            const std::string name = "m" + std::to_string(j);
+            if (below(4) == 0) {
+                d.clutches.push_back(
+                    clutch("b" + name, name, "", real(20, 100), 1.1,
+                           ActuationDirect{sine(1, real(0.3, 1.5), -1e300, 1e300, real(0, 1)), 0}));
+            }
+            if (below(3) == 0)
+                d.sources.push_back(
+                    source(name, sine(real(20, 150), real(0.5, 4), -1e300, 1e300, real(0, 1))));
+            if (below(6) == 0) d.dampers.push_back({"g" + name, name, "", real(0.01, 1)});
+        }
+        if (d.sources.empty()) d.sources.push_back(source("m0", sine(100, 2)));
+        return d;
+    }
+};
+
+Description with(Description d, Method method) {
+    d.method = method;
+    return d;
+}
+
+// Torques, speeds and accelerations of every device at an instant, for random sets of locked devices, tie-ups of
+// several brakes on one group included.
+TEST(Ark3, InternalTorquesOfEveryLockPatternAreThoseOfTheDenseEngine) {
+    int compared = 0, tied = 0;
+    for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+        Forest forest(seed);
+        Description d = forest.build(true);
+        for (Clutch& c : d.clutches) c.actuation = ActuationConstant{};
+        for (Clutch& c : d.clutches)
+            std::get<DryFriction>(c.friction).sliding_capacity *= 1e6;  // nothing opens here
+        for (Clutch& c : d.clutches) c.initially_locked = forest.below(2) == 0;
+        for (Shaft& s : d.shafts) s.initial_twist = forest.real(-0.1, 0.1);
+        for (Mass& m : d.masses) m.initial_speed = forest.real(-50, 50);
+        for (Clutch& c : d.clutches) {
+            if (!c.initially_locked) c.actuation = ActuationDirect{constant(0), 0};  // open ones stay open
+        }
+        Rig dense(with(d, Method::etd3)), tree(with(d, Method::ark3));
+        ASSERT_EQ(tree.model.engine(), "ark3");
+        observe(dense.model, dense.operators, dense.state, dense.inputs, dense.outputs, dense.scratch);
+        observe(tree.model, tree.operators, tree.state, tree.inputs, tree.outputs, tree.scratch);
+        tied += dense.outputs.certificate.flags & 1;
+        double scale = 1;
+        for (double value : dense.outputs.value) scale = std::max(scale, std::fabs(value));
+        for (std::size_t i = 0; i < dense.outputs.value.size(); ++i) {
+            const std::string& name = dense.model.outputs()[i].name;
+            if (name.rfind("certificate", 0) == 0) continue;
+            EXPECT_NEAR(tree.outputs.value[i], dense.outputs.value[i], 1e-9 * scale)
+                << name << ", seed " << seed;
+        }
+        ++compared;
+    }
+    EXPECT_EQ(compared, 300);
+}
+
+// Runs with every change of state: both engines at a step that resolves the shafts.
+struct Agreement {
+    int agree = 0, differ = 0;
+    std::string worst;
+};
+
+void compare_runs(bool losses, int seeds, double tolerance, Agreement& result) {
+    for (int seed = 1; seed <= seeds; ++seed) {
+        const Description d = Forest(static_cast<std::uint64_t>(seed) + 1000).build(losses);
+        const BuildOptions options{1e-4, KernelKind::automatic};
+        Rig dense(with(d, Method::etd3), options), tree(with(d, Method::ark3), options);
+        const std::size_t n = d.masses.size();
+        std::vector<double> range(n, 1), difference(n, 0);
+        for (int step = 0; step < 5000; ++step) {
+            dense.step();
+            tree.step();
+            for (std::size_t j = 0; j < n; ++j) {
+                range[j] = std::max(range[j], std::fabs(dense.state.speeds()[j]));
+                difference[j] =
+                    std::max(difference[j], std::fabs(dense.state.speeds()[j] - tree.state.speeds()[j]));
+            }
+            ASSERT_EQ(tree.outputs.certificate.flags & 4, 0);
+            ASSERT_LT(tree.outputs.certificate.constraint_violation, 1e-11);
+        }
+        double worst = 0;
+        for (std::size_t j = 0; j < n; ++j) worst = std::max(worst, difference[j] / range[j]);
+        ++(worst < tolerance ? result.agree : result.differ);
+        if (worst >= tolerance)
+            result.worst += " seed " + std::to_string(seed) + ": " + std::to_string(worst);
+        const double defect =
+            std::fabs(tree.out("energy.defect")) / (1 + std::fabs(tree.out("energy.dissipated")));
+        EXPECT_LT(defect, 1e-5) << "seed " << seed;
+    }
+}
+
+TEST(Ark3, RunsOfRandomForestsAgreeWithTheDenseEngine) {
+    Agreement result;
+    compare_runs(false, 60, 1e-5, result);
+    EXPECT_EQ(result.differ, 0) << result.worst;
+}
+
+TEST(Ark3, RunsWithLossyGearsAgreeWithTheDenseEngine) {
+    Agreement result;
+    compare_runs(true, 60, 1e-4, result);
+    EXPECT_EQ(result.differ, 0) << result.worst;
+}
+
+// ---- the choice of engine ---------------------------------------------------------------------------------
+
+Description chain(int n) {
+    Description d;
+    d.name = "chain";
+    for (int j = 0; j < n; ++j) {
+        const std::string b = "m" + std::to_string(j), a = "m" + std::to_string(j - 1);
+        d.masses.push_back(mass(b, 1 + 0.1 * (j % 7), 100));
+        if (j == 0) continue;
+        if (j % 5 == 0) {
+            d.clutches.push_back(clutch("c" + b, a, b, 300, 1.1));
+        } else {
+            d.shafts.push_back({"s" + b, a, b, 2e4, 10, 0});
+        }
+    }
+    d.sources = {source("m0", sine(200, 3))};
+    return d;
+}
+
+TEST(Ark3, IsChosenForLongChainsAndRefusedForLoops) {
+    EXPECT_EQ(Model::build(chain(10)).engine(), "etd3");
+    EXPECT_EQ(Model::build(chain(60)).engine(), "ark3");
+    Description d = chain(60);
+    d.method = Method::etd3;
+    EXPECT_EQ(Model::build(d).engine(), "etd3");
+    d.method = Method::automatic;
+    d.clutches.push_back(clutch("loop", "m3", "m40", 100));
+    EXPECT_EQ(Model::build(d).engine(), "etd3") << "a loop needs the dense engine";
+    d.method = Method::ark3;
+    try {
+        Model::build(d);
+        FAIL();
+    } catch (const ModelError& error) {
+        EXPECT_STREQ(error.what(),
+                     "model \"chain\": method = ark3 needs a machine without loops: \"sm39\" closes a loop");
+    }
+}
+
+// Order 3 on a smooth, locked chain: halving h divides the error by about eight.
+TEST(Ark3, IsOfThirdOrder) {
+    const auto end_speed = [](double h) {
+        Description d = chain(12);
+        d.method = Method::ark3;
+        for (Clutch& c : d.clutches) {
+            c.initially_locked = true;
+            std::get<DryFriction>(c.friction).sliding_capacity = 1e9;
+        }
+        for (Shaft& s : d.shafts) s.stiffness = 2000;
+        Rig rig(d, {h, KernelKind::automatic});
+        rig.run(0.4);
+        return rig.state.speeds()[5];
+    };
+    const double exact = end_speed(1e-4 / 8);
+    const double coarse = std::fabs(end_speed(2e-3) - exact), fine = std::fabs(end_speed(1e-3) - exact);
+    EXPECT_GT(std::log2(coarse / fine), 2.7);
+    EXPECT_LT(std::log2(coarse / fine), 3.5);
+}
+
+TEST(Ark3, ScratchHoldsNothingThatSurvivesAStep) {
+    Description d = Forest(77).build(true);
+    d.method = Method::ark3;
+    Rig plain(d), dirty(d);
+    for (int i = 0; i < 500; ++i) {
+        plain.step();
+        dirty.scratch.fill_with_nan();
+        dirty.operators.drop();
+        dirty.step();
+    }
+    EXPECT_TRUE(std::ranges::equal(plain.state.bytes(), dirty.state.bytes()));
+}
+
+}  // namespace
+}  // namespace shiftrig::plant
