@@ -58,6 +58,11 @@ class Bus {
         return lcm_ ? std::optional(lcm_->rig_time_ns()) : std::nullopt;
     }
 
+    // For snapshots: the link of an in-process bus. What stands behind other buses is the world's, which has no snapshot.
+    void archive(io::Archive& a) {
+        if (can_ && !owned_) can_->archive(a);
+    }
+
     const std::string& name() const noexcept { return name_; }
     std::uint64_t messages_lost() const noexcept;          // known to be lost, either way
     std::vector<std::string> warnings() const;             // at start

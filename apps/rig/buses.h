@@ -34,6 +34,12 @@ class Buses {
     // What the rig has to say at `now_ns`; then the built-in controller takes its turn.
     void send(std::int64_t now_ns, const io::SignalTable& signals) SHIFTRIG_REALTIME;
 
+    void archive(io::Archive& a) {
+        if (wire_) wire_->archive(a);
+        for (auto& each : buses_) each.archive(a);
+        if (node_) node_->archive(a);
+    }
+
     bool any() const noexcept { return !buses_.empty(); }
     // A command is heard on at least one bus; true where there is no bus at all.
     bool command_valid() const SHIFTRIG_REALTIME;

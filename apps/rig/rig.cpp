@@ -215,4 +215,11 @@ std::vector<plant::Signal> Rig::rig_signals() const {
     return result;
 }
 
+void Rig::archive(io::Archive& a) {
+    a(ticks_, state_.block, inputs_.value, outputs_.value, signals_.value, last_status_);
+    timeline_.archive(a);
+    safe_commands_.archive(a);
+    buses_.archive(a);
+}
+
 }  // namespace shiftrig::rig

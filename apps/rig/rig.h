@@ -100,6 +100,10 @@ class Rig {
 
     Buses& buses() noexcept { return buses_; }
 
+    // Everything that a tick depends on and changes: saved and restored into a rig of the same set-up, the run goes on
+    // as if nothing had happened, bit for bit.
+    void archive(io::Archive& a);
+
   private:
     struct Request {
         int signal;

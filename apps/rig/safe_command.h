@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "io/archive.h"
 #include "io/model_file.h"
 #include "plant/plant.h"
 
@@ -21,6 +22,7 @@ class SafeCommands {
     // Once a tick, on the inputs about to be applied.
     void apply(bool command_valid, std::int64_t time_ns, std::span<double> inputs) SHIFTRIG_REALTIME;
     bool active() const noexcept { return active_; }
+    void archive(io::Archive& a) { a(ramps_, active_, since_); }
 
   private:
     struct Ramp {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "io/archive.h"
 #include "io/scenario_file.h"
 #include "io/signals.h"
 #include "plant/realtime.h"
@@ -35,6 +36,7 @@ class Timeline {
     // The entries that the last apply() began.
     std::span<const Entry> begun() const noexcept { return std::span(entries_).subspan(begun_, next_ - begun_); }
 
+    void archive(io::Archive& a) { a(entries_, begun_, next_, oldest_); }
 
   private:
     std::vector<Entry> entries_;  // by time

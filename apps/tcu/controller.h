@@ -17,6 +17,7 @@
 #include "apps/tcu/gear_choice.h"
 #include "apps/tcu/machine.h"
 #include "apps/tcu/shift.h"
+#include "io/archive.h"
 
 namespace shiftrig::tcu {
 
@@ -30,6 +31,14 @@ class Controller {
     Commands step(const Sensors& sensors) noexcept;
 
     Mode mode() const noexcept { return mode_; }
+
+    void archive(io::Archive& a) {
+        Controller copy = *this;
+        copy.cal_ = nullptr;  // an address means nothing to another run
+        a(copy);
+        copy.cal_ = cal_;
+        *this = copy;
+    }
 
   private:
     void listen(const Sensors& s) noexcept;

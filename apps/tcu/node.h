@@ -27,6 +27,12 @@ class Node {
     // As if the controller had been switched off and on again: it forgets everything.
     void restart() SHIFTRIG_REALTIME;
 
+    void archive(io::Archive& a) {
+        controller_.archive(a);
+        bus_.archive(a);
+        a(signals_.value, commands_, last_cycle_ns_, last_rig_time_ns_, counted_ns_);
+    }
+
     const Controller& controller() const noexcept { return controller_; }
     const Commands& commands() const noexcept { return commands_; }
     bus::Bus& bus() noexcept { return bus_; }

@@ -104,4 +104,13 @@ void InProcessBus::run_to(std::int64_t now_ns) SHIFTRIG_REALTIME {
     }
 }
 
+void InProcessBus::archive(Archive& a) {
+    for (const auto& end : ends_) {
+        end->inbox.archive(a);
+        end->outbox.archive(a);
+        a(end->count);
+    }
+    a(free_at_ns_, busy_ns_);
+}
+
 }  // namespace shiftrig::io::can

@@ -10,6 +10,7 @@
 #include <memory>
 #include <vector>
 
+#include "io/archive.h"
 #include "io/can/port.h"
 #include "io/can/ring.h"
 
@@ -32,6 +33,9 @@ class InProcessBus {
     CanPort& end(int index);
     // Time the bus has been occupied so far [ns]; load = busy / elapsed. 0 on an ideal bus.
     std::int64_t busy_ns() const noexcept { return busy_ns_; }
+
+    // Everything on the wire and in the queues.
+    void archive(Archive& archive);
 
   private:
     class End;

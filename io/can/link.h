@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "io/archive.h"
 #include "io/can/port.h"
 #include "io/signals.h"
 #include "plant/realtime.h"
@@ -101,6 +102,9 @@ class CanLink {
     // One line each, for the user, at start: bus overloaded, messages without a cycle time, …
     const std::vector<std::string>& warnings() const noexcept;
     CanPort& port() noexcept;
+
+    // What changes while the link runs; the port is not part of it.
+    void archive(Archive& archive);
 
   private:
     struct Data;

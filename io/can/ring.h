@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "io/archive.h"
+
 namespace shiftrig::io::can {
 
 template <class T>
@@ -25,6 +27,18 @@ class Ring {
         --count_;
     }
     void clear() noexcept { first_ = count_ = 0; }
+
+    // Only the items that are in it.
+    void archive(Archive& a) {
+        std::size_t count = count_;
+        a(count);
+        if (a.restoring()) clear();
+        for (std::size_t i = 0; i < count; ++i) {
+            T item = a.restoring() ? T{} : items_[(first_ + i) % items_.size()];
+            a(item);
+            if (a.restoring()) push(item);
+        }
+    }
 
   private:
     std::vector<T> items_;
