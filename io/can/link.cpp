@@ -144,6 +144,10 @@ void CanLink::Data::decode(const ReceivedMessage& message, const Frame& frame,
 void CanLink::Data::take(const Frame& frame, std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME {
     ReceivedMessage* message = match(frame);
     if (!message) return;
+    // After silence a sender may count from anywhere; one that never fell silent may not.
+    if (message->timeout_ns > 0 && now_ns - message->heard_ns > message->timeout_ns)
+        message->counting = false;
+    message->heard_ns = now_ns;
     if (!trusted(*message, frame)) {
         message->bad_ns = now_ns;
         message->seen_bad = message->last_was_bad = true;
@@ -185,7 +189,6 @@ void CanLink::Data::supervise(std::int64_t now_ns, SignalTable& signals) SHIFTRI
 
         if (overdue && message.seen_good && !message.was_overdue) {
             ++message.report.timeouts;
-            message.counting = false;  // whoever comes back starts counting anew
             if (!message.hold)
                 for (const Field& field : message.fields)
                     signals.value[static_cast<std::size_t>(field.index)] = field.absent;

@@ -71,7 +71,7 @@ struct ReceivedMessage {
     std::vector<Field> fields;
     int status_index = -1;
 
-    std::int64_t good_ns = 0, bad_ns = 0;
+    std::int64_t heard_ns = 0, good_ns = 0, bad_ns = 0;  // last frame at all, trusted, not trusted
     bool seen_good = false, seen_bad = false, last_was_bad = false, was_overdue = false;
     bool counting = false;  // last_counter is known
     unsigned last_counter = 0;

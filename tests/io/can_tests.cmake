@@ -11,6 +11,7 @@ shiftrig_can_test(can_codec_test)
 shiftrig_can_test(can_dbc_test)
 shiftrig_can_test(can_link_test ${CMAKE_CURRENT_LIST_DIR}/count_allocations.cpp)
 shiftrig_can_test(can_candump_test)
+shiftrig_can_test(can_faults_test ${CMAKE_CURRENT_LIST_DIR}/count_allocations.cpp)
 shiftrig_can_test(can_j1939_test ${CMAKE_CURRENT_LIST_DIR}/count_allocations.cpp)
 
 # In a network of its own (unshare), therefore one test of ctest.
