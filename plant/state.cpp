@@ -179,7 +179,12 @@ void start(const Model& model, State& state, const Start& start, const Inputs& i
         pinned.emplace_back(mass, speed);
     }
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(m.masses);
-    const Eigen::VectorXd speeds = compatible_speeds(m, rest, locked, true, pinned);
+    Eigen::VectorXd speeds = compatible_speeds(m, rest, locked, true, pinned);
+    // What nothing drives stands, exactly: a wheel that creeps at 1e-16 rad/s would have any slip.
+    const double rounding = 1e-12 * speeds.cwiseAbs().maxCoeff();
+    for (double& speed : speeds) {
+        if (std::fabs(speed) < rounding) speed = 0;
+    }
     for (const auto& [mass, speed] : pinned) {
         if (std::fabs(speeds(mass) - speed) > 1e-9 * (1 + std::fabs(speed))) {
             throw ModelError("start", m.structure.mass_names[static_cast<std::size_t>(mass)], "speeds",
