@@ -124,4 +124,46 @@ double pair_load(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {
     return load_from_engagement(law.friction, load.values.at(at.fraction));
 }
 
+namespace {
+
+constexpr double a_little = 1e-7;  // of a step
+
+Instant instant_at(const Work& w, double fraction, Side side) noexcept {
+    return {w.start + fraction * w.h, fraction, side};
+}
+
+bool has_moving_load(const Work& w, int pair) noexcept {
+    const auto i = static_cast<std::size_t>(pair);
+    const PairLoad& load = w.scratch.loads[i];
+    switch (w.model.pair_laws[i].source) {
+        case LoadSource::waveform: return !load.fixed;
+        case LoadSource::hydraulic:
+            return !load.fixed && !(load.hydraulic.valve.begin == load.hydraulic.valve.end &&
+                                    load.hydraulic.valve.begin == load.hydraulic.valve.middle);
+        case LoadSource::release:
+        case LoadSource::apply: return !load.fixed && load.values.begin != load.values.end;
+        default: return false;
+    }
+}
+
+}  // namespace
+
+bool is_pressed(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {
+    if (!has_moving_load(w, pair) || at.fraction >= 1) return false;
+    return pair_load(w, pair, instant_at(w, at.fraction + a_little, Side::left)) > 0;
+}
+
+double load_edge(const Work& w, int pair, double from, double until) SHIFTRIG_REALTIME {
+    if (!has_moving_load(w, pair)) return 1;
+    double before = from + a_little, after = until - a_little;
+    const bool pressed = pair_load(w, pair, instant_at(w, before, Side::left)) > 0;
+    if ((pair_load(w, pair, instant_at(w, after, Side::left)) > 0) == pressed) return 1;
+    while (after - before > 1e-12) {
+        const double middle = 0.5 * (before + after);
+        if (middle <= before || middle >= after) break;
+        ((pair_load(w, pair, instant_at(w, middle, Side::left)) > 0) == pressed ? before : after) = middle;
+    }
+    return after;
+}
+
 }  // namespace shiftrig::plant::detail

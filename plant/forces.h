@@ -31,6 +31,12 @@ void hold_actuation(Work& work) SHIFTRIG_REALTIME;
 // Load of a pair at an instant: times its friction factor this is its capacity. [Nm]
 double pair_load(const Work& work, int pair, const Instant& at) SHIFTRIG_REALTIME;
 
+// Where between two fractions of the step the load of a pair starts or ends to be there: 1 if nowhere.
+double load_edge(const Work& work, int pair, double from, double until) SHIFTRIG_REALTIME;
+
+// Does the pair carry anything at this instant, or from it on?
+bool is_pressed(const Work& work, int pair, const Instant& at) SHIFTRIG_REALTIME;
+
 // From z and the auxiliary states of the sample, with the contact states `contact`: capacities, forces f,
 // auxiliary rates and powers.
 void evaluate_forces(const Work& work, const unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;

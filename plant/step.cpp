@@ -26,6 +26,7 @@ double next_split(const Work& w, double from) SHIFTRIG_REALTIME {
     const auto first = std::upper_bound(times.begin(), times.end(), w.start + from * w.h);
     for (auto time = first; time != times.end() && *time < w.start + w.h; ++time)
         consider((*time - w.start) / w.h);
+    for (int k = 0; k < w.model.pairs; ++k) consider(load_edge(w, k, from, split));
     return split;
 }
 

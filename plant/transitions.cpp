@@ -102,7 +102,7 @@ void engage_and_release(Work& w, Sample& s) {
     const ModelData& m = w.model;
     bool changed = false;
     for (int k = 0; k < m.pairs; ++k) {
-        const bool capable = s.sliding[k] > 0 || s.holding[k] > 0;
+        const bool capable = s.sliding[k] > 0 || s.holding[k] > 0 || is_pressed(w, k, s.at);
         const double slip = slip_of(pair_links(w, k), s.z);
         if (!capable && w.contact[k] != free_running) {
             log_event(w, EventKind::release, k, s.at.time, s.torque[k], 0, slip);
