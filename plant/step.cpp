@@ -1,5 +1,6 @@
 // One step of the plant. [Algin] Fig. 10, with the state changes of eq. (12), (13) found inside the step.
 #include <algorithm>
+#include <cmath>
 
 #include "plant/ark3.h"
 #include "plant/etd3.h"
@@ -39,6 +40,27 @@ void integrate(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME
     }
 }
 
+// Partial steps to where the device's margin vanishes: one as a rule, more where the margin is far from
+// its parabola (shafts that swing within the step). Returns the fraction reached; `end` is there.
+double approach(Work& w, const Mode& mode, const Crossing& crossing, double done, double until) SHIFTRIG_REALTIME {
+    constexpr int most_steps = 4;
+    constexpr double close_enough = 1e-5;  // of the margins at both ends
+    double low = done, high = until;
+    double at_low = margin(w, crossing.device, w.scratch.begin), at_high = margin(w, crossing.device, w.scratch.end);
+    const double size = std::fabs(at_low) + std::fabs(at_high);
+    double reached = done + crossing.theta * (until - done);
+    for (int steps = 1;; ++steps) {
+        integrate(w, mode, reached);
+        const double rest = margin(w, crossing.device, w.scratch.end);
+        if (std::fabs(rest) <= close_enough * size || steps == most_steps) return reached;
+        (rest > 0 ? low : high) = reached;
+        (rest > 0 ? at_low : at_high) = rest;
+        // Secant, kept off the ends of the bracket.
+        const double share = at_low > 0 ? at_low / (at_low - at_high) : 0.5;
+        reached = low + std::clamp(share, 0.01, 0.99) * (high - low);
+    }
+}
+
 }  // namespace
 
 void step(const Model& model, Operators& operators, State& state, const Inputs& inputs, Outputs& outputs,
@@ -69,8 +91,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         if (inside && first.theta * (until - done) < instant) {
             reached = done;
         } else if (inside && first.theta < 1 - instant) {
-            reached = done + first.theta * (until - done);
-            integrate(w, *mode, reached);
+            reached = approach(w, *mode, first, done, until);
         }
 
         // Energy ledger of the accepted part.

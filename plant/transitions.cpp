@@ -347,6 +347,13 @@ Mode& settle(Work& w, Sample& s) SHIFTRIG_REALTIME {
     }
 }
 
+double margin(const Work& w, int device, const Sample& s) SHIFTRIG_REALTIME {
+    const unsigned char state = w.contact[device];
+    if (device >= w.model.pairs) return motion_sign(state) * device_slip(w, device, s.z);
+    if (state == locked) return s.holding[device] - std::fabs(s.torque[device]);
+    return slip_sign(state) * device_slip(w, device, s.z);
+}
+
 Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, const Sample& end) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     Crossing first;
@@ -357,16 +364,15 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, const Sample& 
         if (k < m.pairs && w.contact[k] == locked) {
             if (!middle_known) internal_torques(w, mode, w.scratch.half);
             middle_known = true;
-            const auto margin = [k](const Sample& s) { return s.holding[k] - std::fabs(s.torque[k]); };
-            const double g0 = margin(begin), gm = margin(w.scratch.half), g1 = margin(end);
+            const double g0 = margin(w, k, begin), gm = margin(w, k, w.scratch.half), g1 = margin(w, k, end);
             theta = g0 <= 0 ? 0 : parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
         } else {
             if (!rates_known) sample_rate(w, mode, begin);
             rates_known = true;
             const double sign = k < m.pairs ? slip_sign(w.contact[k]) : motion_sign(w.contact[k]);
             const double length = end.at.time - begin.at.time;
-            theta = parabola_root(sign * device_slip(w, k, begin.z), sign * device_slip(w, k, begin.rate) * length,
-                                  sign * device_slip(w, k, end.z));
+            theta = parabola_root(margin(w, k, begin), sign * device_slip(w, k, begin.rate) * length,
+                                  margin(w, k, end));
         }
         if (first.device < 0 || theta < first.theta) first = {k, theta};
     }

@@ -20,6 +20,10 @@ struct Crossing {
 // changes sign ([Algin] eq. (13)), a torque above the static capacity (eq. (12)).
 Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, const Sample& end) SHIFTRIG_REALTIME;
 
+// How far from changing the device is at the sample: slip in the direction of its motion, or capacity left.
+// Negative: its state does not hold.
+double margin(const Work& work, int device, const Sample& sample) SHIFTRIG_REALTIME;
+
 // Changes the state of one device at the sample, and with it of all that its closing brings to rest.
 void change_state(Work& work, int device, Sample& sample) SHIFTRIG_REALTIME;
 
