@@ -97,6 +97,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         // Energy ledger of the accepted part.
         if (reached > done) {
             book(w, *mode);
+            mode = &correct_directions(w, *mode);
             accept(w);
             done = reached;
         }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "plant/dense.h"
+#include "plant/ledger.h"
 
 namespace shiftrig::plant::detail {
 namespace {
@@ -329,6 +330,49 @@ double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
         std::copy(joined, joined + m.masses, speeds);
     }
     return before - kinetic_energy();
+}
+
+// With x wrong, the acceleration is off by B_r (Ĉ_w − Ĉ_r) M_1, and M_1 grows linearly from the instant of
+// reversal: half of M_1 at the end, over the rest of the part.
+Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const Sample& begin = w.scratch.begin;
+    Sample& end = w.scratch.end;
+    const double h = end.at.time - begin.at.time;
+    double* impulse = w.scratch.vector_a.data();
+    double* change = w.scratch.vector_b.data();
+    double longest = 0;
+    for (int k = 0; k < m.meshes; ++k) {
+        unsigned char& state = w.contact[m.pairs + k];
+        const Mesh& mesh = mesh_of(w, k);
+        if (state == stuck || !mesh.lossy() || mode.bound[m.pairs + k]) continue;
+        const double sign = motion_sign(state), kink = loss_kink(mesh, sign);
+        const double from = (begin.torque[m.pairs + k] - kink) * sign * loss_exponent(state);
+        const double to = (end.torque[m.pairs + k] - kink) * sign * loss_exponent(state);
+        if (to >= 0 || from <= 0) continue;
+        if (longest == 0) std::fill(impulse, impulse + m.masses, 0.);
+        const double rest = to / (to - from) * h;  // of the part, after the reversal [s]
+        const unsigned char turned = state ^ driven;
+        const double given = 0.5 * rest * (end.torque[m.pairs + k] - kink) *
+                             (mesh.force_ratio(loss_exponent(turned)) - mesh.force_ratio(loss_exponent(state)));
+        impulse[mesh.second] += given;
+        if (mesh.carrier >= 0) impulse[mesh.carrier] -= given;
+        longest = std::max(longest, rest);
+        state = turned;
+    }
+    if (longest == 0) return mode;
+    Mode& turned = find_mode(m, w.operators, w.contact, w.scratch);
+    m.kernel.multiply(turned.mobility, padded(m.masses) / panel_rows, m.masses, impulse, nullptr, change);
+    const double before = stored_energy(m, end.z);
+    for (int j = 0; j < m.masses; ++j) end.z[j] += change[j];
+    for (int e = 0; e < m.twists; ++e) {
+        end.z[m.masses + e] += longest / 3 * slip_of(m.structure.shafts[static_cast<std::size_t>(e)].links, change);
+    }
+    w.scratch.dissipated += before - stored_energy(m, end.z);
+    evaluate_forces(w, w.contact, end);
+    internal_torques(w, turned, end);
+    sample_rate(w, turned, end);
+    return turned;
 }
 
 Mode& settle(Work& w, Sample& s) SHIFTRIG_REALTIME {

@@ -30,6 +30,11 @@ void change_state(Work& work, int device, Sample& sample) SHIFTRIG_REALTIME;
 // The article's next-step rule: every device whose state did not hold changes at the end of the step.
 void change_all(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
+// Power that turned round inside the part just computed: its end is moved by the impulse that the other loss
+// would have given from then on, and the mesh takes the other direction. Keeps the order across reversals
+// without locating them. Returns the mode at the end.
+Mode& correct_directions(Work& work, Mode& mode) SHIFTRIG_REALTIME;
+
 // ω⁺ = B J ω: the impulse through the active rigid set of `mode` that makes its speeds agree. Returns the
 // kinetic energy lost [J].
 double join(Work& work, const Mode& mode, double* speeds) SHIFTRIG_REALTIME;
