@@ -339,8 +339,7 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
     const Sample& begin = w.scratch.begin;
     Sample& end = w.scratch.end;
     const double h = end.at.time - begin.at.time;
-    double* impulse = w.scratch.vector_a.data();
-    double* change = w.scratch.vector_b.data();
+    double* change = w.scratch.vector_c.data();  // of the speeds: first as if every mass were free
     double longest = 0;
     for (int k = 0; k < m.meshes; ++k) {
         unsigned char& state = w.contact[m.pairs + k];
@@ -350,19 +349,19 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
         const double from = (begin.torque[m.pairs + k] - kink) * sign * loss_exponent(state);
         const double to = (end.torque[m.pairs + k] - kink) * sign * loss_exponent(state);
         if (to >= 0 || from <= 0) continue;
-        if (longest == 0) std::fill(impulse, impulse + m.masses, 0.);
+        if (longest == 0) std::fill(change, change + m.masses, 0.);
         const double rest = to / (to - from) * h;  // of the part, after the reversal [s]
         const unsigned char turned = state ^ driven;
         const double given = 0.5 * rest * (end.torque[m.pairs + k] - kink) *
                              (mesh.force_ratio(loss_exponent(turned)) - mesh.force_ratio(loss_exponent(state)));
-        impulse[mesh.second] += given;
-        if (mesh.carrier >= 0) impulse[mesh.carrier] -= given;
+        change[mesh.second] += given / m.structure.inertia[static_cast<std::size_t>(mesh.second)];
+        if (mesh.carrier >= 0) change[mesh.carrier] -= given / m.structure.inertia[static_cast<std::size_t>(mesh.carrier)];
         longest = std::max(longest, rest);
         state = turned;
     }
     if (longest == 0) return mode;
     Mode& turned = find_mode(m, w.operators, w.contact, w.scratch);
-    m.kernel.multiply(turned.mobility, padded(m.masses) / panel_rows, m.masses, impulse, nullptr, change);
+    join(w, turned, change);
     const double before = stored_energy(m, end.z);
     for (int j = 0; j < m.masses; ++j) end.z[j] += change[j];
     for (int e = 0; e < m.twists; ++e) {
