@@ -170,7 +170,7 @@ void observe(const Model& model, Operators& operators, const State& state, const
              Outputs& outputs, Scratch& scratch) SHIFTRIG_REALTIME;
 
 // A state in motion: the named devices locked, the given mass speeds taken, all others following through
-// locked devices, gears and (untwisted) shafts; actuators at rest at the values of `inputs`.
+// locked devices, gears, (untwisted) shafts and rolling tyres; actuators at rest at the values of `inputs`.
 struct Start {
     std::vector<std::string> locked;
     std::vector<std::pair<std::string, double>> speeds;

@@ -20,19 +20,30 @@ constexpr double at_rest = 1e-9;  // [rad/s]
 // The speeds nearest to `wanted` (in the sense of kinetic energy, so that momentum is conserved) for which
 // the named columns slip at zero and the pinned masses turn as told.
 Eigen::VectorXd compatible_speeds(const ModelData& m, const Eigen::VectorXd& wanted, const std::vector<int>& locked,
-                                  bool untwisted, const std::vector<std::pair<int, double>>& pinned) {
+                                  bool following, const std::vector<std::pair<int, double>>& pinned) {
     const Structure& s = m.structure;
     const Eigen::MatrixXd pairs = s.pair_columns(), meshes = s.mesh_columns(), shafts = s.shaft_columns();
     const auto n = static_cast<Eigen::Index>(m.masses);
-    const Eigen::Index rows = static_cast<Eigen::Index>(locked.size() + pinned.size()) + meshes.cols() +
-                              (untwisted ? shafts.cols() : 0);
+    // What is not rigid follows as if it were: shafts untwisted, tyres rolling unless the body's speed is told.
+    std::vector<std::size_t> rolling;
+    for (std::size_t t = 0; following && t < m.tyres.size(); ++t) {
+        const auto told = [&](const auto& pin) { return pin.first == m.tyres[t].body; };
+        if (std::none_of(pinned.begin(), pinned.end(), told)) rolling.push_back(t);
+    }
+    const Eigen::Index rows = static_cast<Eigen::Index>(locked.size() + pinned.size() + rolling.size()) +
+                              meshes.cols() + (following ? shafts.cols() : 0);
     if (rows == 0) return wanted;
     Eigen::MatrixXd c(rows, n);
     Eigen::VectorXd value = Eigen::VectorXd::Zero(rows);
     Eigen::Index row = 0;
     for (int k : locked) c.row(row++) = pairs.col(k).transpose();
     for (Eigen::Index k = 0; k < meshes.cols(); ++k) c.row(row++) = meshes.col(k).transpose();
-    for (Eigen::Index k = 0; untwisted && k < shafts.cols(); ++k) c.row(row++) = shafts.col(k).transpose();
+    for (Eigen::Index k = 0; following && k < shafts.cols(); ++k) c.row(row++) = shafts.col(k).transpose();
+    for (const std::size_t t : rolling) {
+        c.row(row).setZero();
+        c(row, m.tyres[t].wheel) = m.description.tyres[t].radius;
+        c(row++, m.tyres[t].body) = -1;
+    }
     for (const auto& [mass, speed] : pinned) {
         c.row(row).setZero();
         c(row, mass) = 1;
