@@ -1,10 +1,11 @@
 # The program `shiftrig`: main.cpp and one file per command.
 find_package(CLI11 REQUIRED)
+find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 file(GLOB SHIFTRIG_SOURCES CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/shiftrig/*.cpp)
 add_executable(shiftrig ${SHIFTRIG_SOURCES})
 target_compile_definitions(shiftrig PRIVATE SHIFTRIG_VERSION="${PROJECT_VERSION}")
-target_link_libraries(shiftrig PRIVATE shiftrig_options CLI11::CLI11 nlohmann_json::nlohmann_json)
+target_link_libraries(shiftrig PRIVATE shiftrig_options CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
 foreach(part plant rt signals model can lcm recording analysis drawing rig tcu)
   if(TARGET shiftrig_${part})
     target_link_libraries(shiftrig PRIVATE shiftrig_${part})

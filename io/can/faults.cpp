@@ -233,6 +233,20 @@ std::size_t FaultyPort::receive(std::int64_t now_ns, std::span<Frame> frames) SH
     return taken;
 }
 
+void FaultyPort::archive(Archive& a) {
+    for (Active& active : faults_)
+        a(active.random, active.running, active.frozen, active.frames, active.frozen_raw,
+          active.next_babble_ns, active.held);
+    for (auto& heap : waiting_) {
+        std::size_t count = heap.size();
+        a(count);
+        heap.resize(std::min(count, kMostWaiting));
+        for (Waiting& entry : heap) a(entry);
+    }
+    a(order_, dropped_sending_, dropped_receiving_, off_, bus_offs_);
+    events_.archive(a);
+}
+
 PortState FaultyPort::state() const SHIFTRIG_REALTIME {
     return off_ ? PortState::bus_off : port_.state();
 }

@@ -91,6 +91,7 @@ class FaultyPort final : public CanPort {
     // Beginnings and ends of faults since the last call.
     bool next_event(FaultEvent& event) SHIFTRIG_REALTIME;
     const FaultPlan& plan() const noexcept { return plan_; }
+    void archive(Archive& archive);
 
   private:
     struct Active;  // a fault with its descriptors and its state

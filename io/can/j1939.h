@@ -61,6 +61,12 @@ class Network {
     bool set_fault(std::uint32_t spn, std::uint8_t fmi, bool active, std::uint8_t address) SHIFTRIG_REALTIME;
 
     const std::vector<Node>& nodes() const noexcept { return nodes_; }
+    void archive(Archive& a) {
+        transport.archive(a);
+        requests_.archive(a);
+        for (Node& node : nodes_) a(node.claim, node.claimed_at_ns, node.cannot_claim_ns, node.announce);
+        a(faults_, fault_count_, faults_told_, faults_changed_, dm1_due_ns_, started_);
+    }
     Transport transport;
 
   private:

@@ -36,6 +36,11 @@ class Transport {
     void run(std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
     // Messages that have arrived whole.
     bool next(LongMessage& message) SHIFTRIG_REALTIME;
+    void archive(Archive& a) {
+        waiting_.archive(a);
+        arrived_.archive(a);
+        a(arrivals_, phase_, sending_, next_packet_, clear_until_, due_ns_, deadline_ns_);
+    }
 
   private:
     enum class Phase : std::uint8_t { idle, announce, packets, wait_clear, wait_end };

@@ -6,8 +6,8 @@ namespace shiftrig::io::can {
 namespace {
 
 void archive_report(Archive& a, MessageReport& r) {
-    a(r.status, r.good, r.wrong_length, r.wrong_checksum, r.wrong_counter, r.implausible, r.missed, r.timeouts, r.limited,
-      r.send_dropped);
+    a(r.status, r.good, r.wrong_length, r.wrong_checksum, r.wrong_counter, r.implausible, r.missed,
+      r.timeouts, r.limited, r.send_dropped);
 }
 
 }  // namespace
@@ -16,7 +16,8 @@ void CanLink::archive(Archive& a) {
     Data& d = *data_;
     for (ReceivedMessage& m : d.received) {
         archive_report(a, m.report);
-        a(m.good_ns, m.bad_ns, m.seen_good, m.seen_bad, m.last_was_bad, m.was_overdue, m.counting, m.last_counter);
+        a(m.heard_ns, m.good_ns, m.bad_ns, m.seen_good, m.seen_bad, m.last_was_bad, m.was_overdue, m.counting,
+          m.last_counter);
     }
     for (SentMessage& m : d.sent) {
         archive_report(a, m.report);
@@ -24,6 +25,7 @@ void CanLink::archive(Archive& a) {
         for (Field& field : m.fields) a(field.travelled);
     }
     a(d.started_receiving, d.started_sending, d.valid, d.receive_start_ns, d.last_send_ns);
+    if (d.network) d.network->archive(a);
     a(d.awaiting, d.pending, d.asked_before, d.question_counter, d.question_ns);
 }
 
