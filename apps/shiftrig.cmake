@@ -6,7 +6,7 @@ file(GLOB SHIFTRIG_SOURCES CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/shiftri
 add_executable(shiftrig ${SHIFTRIG_SOURCES})
 target_compile_definitions(shiftrig PRIVATE SHIFTRIG_VERSION="${PROJECT_VERSION}")
 target_link_libraries(shiftrig PRIVATE shiftrig_options CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
-foreach(part plant rt signals model can lcm recording analysis drawing rig tcu)
+foreach(part plant rt signals model can lcm recording analysis drawing report rig tcu serve)
   if(TARGET shiftrig_${part})
     target_link_libraries(shiftrig PRIVATE shiftrig_${part})
   endif()

@@ -22,7 +22,11 @@ Collector::Collector(const Rig& rig, std::int64_t ticks, const CollectorOptions&
     const auto fits = [&](std::size_t signals) {
         return static_cast<std::size_t>(ticks) * (signals + 1) * sizeof(double) <= options.most_bytes;
     };
-    for (int i = 0; i < table.size(); ++i) signals_.push_back(i);
+    const auto wanted = [&](const std::string& name) {
+        return options.only.empty() || std::find(options.only.begin(), options.only.end(), name) != options.only.end();
+    };
+    for (int i = 0; i < table.size(); ++i)
+        if (wanted(table.signal(i).name)) signals_.push_back(i);
     if (!fits(signals_.size()))
         std::erase_if(signals_, [&](int i) { return !matters_for_shifts(table.signal(i).name); });
     capacity_ = static_cast<std::size_t>(ticks);

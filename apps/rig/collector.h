@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "analysis/run.h"
@@ -13,6 +14,7 @@ namespace shiftrig::rig {
 struct CollectorOptions {
     std::size_t most_bytes = std::size_t{256} << 20;
     std::size_t most_events = 100'000;
+    std::vector<std::string> only;  // keep these signals only; empty: all
 };
 
 class Collector {

@@ -7,13 +7,18 @@ namespace shiftrig::cli {
 void RigOptions::add_to(CLI::App& app) {
     app.add_option("MODEL", choices.model, "the machine (YAML); may be left out where a scenario names it");
     app.add_option("--scenario", choices.scenario, "what happens to it (YAML)");
+    app.add_option("--duration", duration_s, "simulated seconds; else the scenario's, else until SIGINT")->check(CLI::PositiveNumber);
+    add_common_to(app);
+}
+
+void RigOptions::add_common_to(CLI::App& app, const std::string& usual_pace) {
+    pace = usual_pace;
     app.add_option("--rate-hz", choices.rate_hz, "ticks per simulated second")->capture_default_str();
     app.add_option("--substeps", choices.substeps, "plant steps per tick")->capture_default_str();
     app.add_option("--pace", pace, "wall: by the clock; lockstep: each tick waits for the controller's answer; free: as fast as it goes")
         ->check(CLI::IsMember({"wall", "lockstep", "free"}))
         ->capture_default_str();
     app.add_option("--factor", factor, "wall pace: simulated time per wall time")->check(CLI::PositiveNumber)->capture_default_str();
-    app.add_option("--duration", duration_s, "simulated seconds; else the scenario's, else until SIGINT")->check(CLI::PositiveNumber);
     app.add_option("--bus", choices.buses, "inprocess | can:vcan0 | udpcan:239.74.163.2:43113 | lcm:udpm://239.255.76.67:7667?ttl=0; repeatable");
     app.add_option("--controller", choices.controller, "builtin[:CALIBRATION] on the in-process bus | none | a command to start");
     app.add_option("--kernel", choices.kernel, "auto | portable | avx2 | avx512")->capture_default_str();

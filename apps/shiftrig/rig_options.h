@@ -23,6 +23,8 @@ struct RigOptions {
     std::vector<int> processors;
 
     void add_to(CLI::App& app);
+    // Everything but MODEL, --scenario and --duration, for commands that bring those themselves.
+    void add_common_to(CLI::App& app, const std::string& usual_pace = "wall");
     // Of the loop of a rig built from `choices`.
     rt::LoopSettings loop(const rig::Setup& setup) const;
     rt::Pace pacing() const;

@@ -1,0 +1,72 @@
+// shiftrig report: a recording as one page that explains itself.
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "analysis/driveline_svg.h"
+#include "analysis/load_run.h"
+#include "analysis/report/report.h"
+#include "analysis/report/shift_page.h"
+#include "apps/shiftrig/command.h"
+#include "io/recording/reader.h"
+
+namespace shiftrig::cli {
+
+namespace {
+
+struct Options {
+    std::string recording, output, limits;
+};
+
+// Only what is shown and judged: an hour of everything would not fit the memory.
+std::vector<std::string> wanted_signals(const std::string& recording) {
+    const io::RecordingReader reader(recording);
+    const auto& manifest = reader.manifest();
+    std::vector<plant::Signal> all = manifest.inputs;
+    all.insert(all.end(), manifest.outputs.begin(), manifest.outputs.end());
+    all.insert(all.end(), manifest.rig.begin(), manifest.rig.end());
+    return analysis::report_signals(all);
+}
+
+int run(const Options& options) {
+    const analysis::Limits limits =
+        options.limits.empty() ? analysis::default_limits() : analysis::read_limits(options.limits);
+    const analysis::Run run = analysis::load_run(options.recording, wanted_signals(options.recording));
+    const analysis::Scorecard card = analysis::score(run, limits);
+
+    analysis::ReportOptions report;
+    report.title = run.machine.name;
+    report.driveline_svg = analysis::driveline_svg(run.machine);
+    for (const auto& score : card.shifts) {
+        report.title +=
+            (&score == &card.shifts.front() ? ": " : ", ") + score.shift.from + " → " + score.shift.to;
+        report.windows.emplace_back(score.shift.asked_at - 0.5, score.shift.ended_at + 1);
+    }
+    std::ofstream file(options.output);
+    file << analysis::report_html(run, analysis::shift_pages(run, card, limits), report);
+    file.close();
+    if (!file) throw std::runtime_error(options.output + ": cannot be written");
+    for (const auto& [name, value] : run.identity)
+        if (name == "incomplete") std::cerr << value << '\n';
+    std::cout << options.output << ": " << card.shifts.size() << " shifts, verdict "
+              << analysis::name(card.verdict) << '\n';
+    return good;
+}
+
+Command::Run declare(CLI::App& app) {
+    auto options = std::make_shared<Options>();
+    app.add_option("RECORDING", options->recording, "of shiftrig run --record")->required();
+    app.add_option("-o,--output", options->output, "the page (.html)")->required();
+    app.add_option("--limits", options->limits,
+                   "what is good and what is rejected (YAML); else config/limits.yaml as built in");
+    return [options] { return run(*options); };
+}
+
+const Command command("report", "a recording as one self-contained HTML page", declare);
+
+}  // namespace
+
+}  // namespace shiftrig::cli

@@ -1,0 +1,88 @@
+// shiftrig serve: the rig with its live dashboard.
+#include <csignal>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "apps/serve/dashboard.h"
+#include "apps/shiftrig/child.h"
+#include "apps/shiftrig/command.h"
+#include "apps/shiftrig/loop_report.h"
+#include "apps/shiftrig/rig_options.h"
+
+namespace shiftrig::cli {
+
+namespace {
+
+struct Options : RigOptions {
+    serve::HttpOptions http;
+    std::string record;
+};
+
+int run(const Options& options) {
+    // SIGINT and SIGTERM are waited for by a thread of their own, so that ending needs nothing signal-safe.
+    sigset_t ends;
+    sigemptyset(&ends);
+    sigaddset(&ends, SIGINT);
+    sigaddset(&ends, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &ends, nullptr);
+
+    rig::Choices choices = options.choices;
+    choices.lockstep = options.pacing() == rt::Pace::lockstep;
+    rig::Rig rig(rig::make_setup(choices));
+    for (const auto& warning : rig.buses().warnings()) std::cerr << warning << '\n';
+
+    serve::DashboardOptions dashboard_options;
+    dashboard_options.http = options.http;
+    dashboard_options.loop = options.loop(rig.setup());
+    dashboard_options.record_path = options.record.empty() ? "shiftrig.lcmlog" : options.record;
+    dashboard_options.record_at_once = !options.record.empty();
+    serve::Dashboard dashboard(rig, dashboard_options);
+    std::cout << "dashboard: " << dashboard.url() << std::endl;
+
+    std::optional<Child> controller;
+    if (const auto command = rig::controller_command(options.choices); !command.empty())
+        controller.emplace(command);
+
+    std::thread([&dashboard, ends] {
+        int which = 0;
+        sigwait(&ends, &which);
+        dashboard.stop();
+    }).detach();
+
+    rt::AwakeProcessors awake;
+    rt::Refusals refusals = prepare_process(options, awake);
+    rt::LoopReport report;
+    std::thread plant([&] {
+        for (auto& refusal : prepare_thread(options)) refusals.push_back(std::move(refusal));
+        report = dashboard.run();
+    });
+    plant.join();
+    controller.reset();
+    for (const auto& refusal : refusals)
+        std::cerr << "this machine does not grant " << rt::to_string(refusal) << '\n';
+    for (const auto& line : rig.buses().summary()) std::cerr << line << '\n';
+    std::cout << describe(report);
+    return report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped ? good : failed;
+}
+
+Command::Run declare(CLI::App& app) {
+    auto options = std::make_shared<Options>();
+    options->add_to(app);
+    app.add_option("--address", options->http.address, "to listen on; any but loopback needs a --token")
+        ->capture_default_str();
+    app.add_option("--port", options->http.port, "0: any free one")
+        ->check(CLI::Range(0, 65535))
+        ->capture_default_str();
+    app.add_option("--token", options->http.token, "that every request must carry (?token=…)");
+    app.add_option("--record", options->record,
+                   "record from the start, to this file (recordings begun from the page go there too)");
+    return [options] { return run(*options); };
+}
+
+const Command command("serve", "the rig with its live dashboard on 127.0.0.1", declare);
+
+}  // namespace
+
+}  // namespace shiftrig::cli

@@ -1,0 +1,181 @@
+// shiftrig test: scenarios with expectations, run side by side and judged.
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <thread>
+
+#include "analysis/expectations.h"
+#include "analysis/junit.h"
+#include "apps/rig/collector.h"
+#include "apps/rig/session.h"
+#include "apps/shiftrig/child.h"
+#include "apps/shiftrig/command.h"
+#include "apps/shiftrig/rig_options.h"
+
+namespace shiftrig::cli {
+
+namespace {
+
+struct Options : RigOptions {
+    std::vector<std::string> scenarios;
+    std::string junit, limits, record_folder;
+    int jobs = 1;
+};
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// What the scorecard and the expectations read: all that has to be kept of a run.
+std::vector<std::string> read_signals(const rig::Rig& rig) {
+    std::vector<std::string> names = analysis::scorecard_signals(rig.model().description());
+    for (const auto& bound : rig.setup().scenario->expect.signals) names.push_back(bound.quantity.signal);
+    return names;
+}
+
+analysis::TestResult run_one(const Options& options, const analysis::Limits& limits,
+                             const std::string& path) {
+    analysis::TestResult result;
+    result.file = path;
+    const auto start = Clock::now();
+    try {
+        io::ScenarioFile scenario = io::read_scenario(path);
+        result.name = scenario.name;
+        result.expectations = analysis::count_expectations(scenario.expect);
+        rig::Choices choices = options.choices;
+        choices.lockstep = options.pacing() == rt::Pace::lockstep;
+        rig::Rig rig(rig::make_setup(choices, scenario));
+        const rt::LoopSettings loop = options.loop(rig.setup());
+
+        rig::CollectorOptions keep;
+        keep.only = read_signals(rig);
+        keep.most_bytes = std::size_t{2} << 30;
+        rig::Collector collector(rig, loop.slots, keep);
+        rig::SessionOptions session_options;
+        session_options.loop = loop;
+        session_options.collector = &collector;
+        std::optional<io::RecordingWriter> recording;
+        if (!options.record_folder.empty()) {
+            recording.emplace(options.record_folder + "/" + scenario.name + ".lcmlog");
+            session_options.recording = &*recording;
+        }
+        rig::Session session(rig, std::move(session_options));
+        std::optional<Child> controller;
+        if (const auto command = rig::controller_command(options.choices); !command.empty())
+            controller.emplace(command);
+        session.run();
+        if (recording) recording->end();
+
+        result.sim_time_s = rig.sim_time();
+        if (collector.ticks_left_out() > 0) {
+            result.error =
+                path + ": the run does not fit the memory: " + std::to_string(collector.ticks_left_out()) +
+                " ticks too many";
+        } else {
+            const analysis::Run run = collector.finish(rig);
+            result.failures = analysis::broken_expectations(scenario, run, analysis::score(run, limits));
+            if (result.expectations == 0)
+                result.failures.push_back(path + ": expects nothing, so it tests nothing");
+        }
+    } catch (const std::exception& error) {
+        result.error = error.what();
+        if (result.name.empty()) result.name = path;
+    }
+    result.wall_time_s = seconds_since(start);
+    return result;
+}
+
+void tell(const analysis::TestResult& result) {
+    std::printf("%s %-28s %8.2f s simulated, %7.0f times real time, %d expectations\n",
+                result.passed() ? "ok  " : "FAIL", result.name.c_str(), result.sim_time_s,
+                result.wall_time_s > 0 ? result.sim_time_s / result.wall_time_s : 0, result.expectations);
+    if (!result.error.empty()) std::printf("     %s\n", result.error.c_str());
+    for (const auto& line : result.failures) std::printf("     %s\n", line.c_str());
+    std::fflush(stdout);
+}
+
+int run(const Options& options) {
+    const analysis::Limits limits =
+        options.limits.empty() ? analysis::default_limits() : analysis::read_limits(options.limits);
+    std::set<std::string> seen;
+    for (const auto& path : options.scenarios)
+        if (!seen.insert(path).second) throw std::invalid_argument("scenario " + path + " is given twice");
+    // A bus outside the process can carry one rig at a time.
+    const bool alone = std::any_of(options.choices.buses.begin(), options.choices.buses.end(),
+                                   [](const std::string& bus) { return bus != "inprocess"; });
+    const int jobs = alone ? 1 : options.jobs;
+
+    const bool terminal = isatty(STDERR_FILENO) != 0;
+    std::vector<analysis::TestResult> results(options.scenarios.size());
+    std::atomic<std::size_t> next{0};
+    std::size_t done = 0;
+    std::mutex telling;
+    const auto start = Clock::now();
+    const auto work = [&] {
+        for (std::size_t i; (i = next++) < results.size();) {
+            results[i] = run_one(options, limits, options.scenarios[i]);
+            const std::lock_guard lock(telling);
+            ++done;
+            if (terminal) std::fprintf(stderr, "\r\033[K");
+            tell(results[i]);
+            if (terminal) std::fprintf(stderr, "%zu of %zu scenarios", done, results.size());
+        }
+    };
+    std::vector<std::thread> workers;
+    for (int i = 1; i < jobs; ++i) workers.emplace_back(work);
+    work();
+    for (auto& worker : workers) worker.join();
+    if (terminal) std::fprintf(stderr, "\r\033[K");
+
+    const double wall = seconds_since(start);
+    double simulated = 0;
+    std::size_t failures = 0;
+    for (const auto& result : results) {
+        simulated += result.sim_time_s;
+        failures += result.passed() ? 0 : 1;
+    }
+    std::printf("%zu scenarios, %zu failed; %.1f s simulated in %.2f s, %.0f times real time\n",
+                results.size(), failures, simulated, wall, wall > 0 ? simulated / wall : 0);
+    if (!options.junit.empty()) {
+        std::ofstream file(options.junit);
+        file << analysis::junit_xml(results);
+        file.close();
+        if (!file) throw std::runtime_error(options.junit + ": cannot be written");
+    }
+    const bool bad =
+        std::any_of(results.begin(), results.end(), [](const auto& r) { return !r.error.empty(); });
+    return bad ? bad_input : failures > 0 ? failed : good;
+}
+
+Command::Run declare(CLI::App& app) {
+    auto options = std::make_shared<Options>();
+    options->add_common_to(app, "free");
+    app.add_option("SCENARIO", options->scenarios, "scenario files with expectations (YAML)")->required();
+    app.add_option("--junit", options->junit, "results as JUnit XML");
+    app.add_option("--jobs", options->jobs,
+                   "scenarios side by side; one at a time on a bus outside the process")
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
+    app.add_option("--limits", options->limits,
+                   "of the scorecard (YAML); else config/limits.yaml as built in");
+    app.add_option("--record", options->record_folder, "keep a recording of every scenario in this folder")
+        ->check(CLI::ExistingDirectory);
+    return [options] { return run(*options); };
+}
+
+const Command command("test", "run scenarios and hold them against their expectations", declare);
+
+}  // namespace
+
+}  // namespace shiftrig::cli
