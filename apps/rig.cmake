@@ -9,6 +9,7 @@ add_library(shiftrig_rig STATIC
   ${CMAKE_CURRENT_LIST_DIR}/rig/rig.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/safe_command.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/session.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/rig/snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/timeline.cpp)
 target_link_libraries(shiftrig_rig PUBLIC shiftrig_tcu shiftrig_recording shiftrig_rt)
 # Where the shipped calibration lies, unless the command line says otherwise.

@@ -3,7 +3,7 @@
 //
 //     void Ramp::archive(io::Archive& a) { a(active_, since_); a(values_); }
 //
-//     const std::vector<std::byte> bytes = io::Archive::save(rig);   // a snapshot
+//     io::Archive::save(rig, bytes);                                 // a snapshot
 //     io::Archive::restore(bytes, rig);                              // back again
 //
 // The bytes are the members' own: they fit the program that wrote them (io/recording/snapshot.h checks).
@@ -21,13 +21,13 @@ namespace shiftrig::io {
 
 class Archive {
   public:
+    // Replaces what is in `bytes`; allocates nothing where its capacity is enough.
     template <class Object>
-    static std::vector<std::byte> save(Object& object) {
-        std::vector<std::byte> bytes;
+    static void save(Object& object, std::vector<std::byte>& bytes) {
+        bytes.clear();
         Archive archive;
         archive.to_ = &bytes;
         object.archive(archive);
-        return bytes;
     }
     // Throws InputError if the object needs more, fewer or other bytes.
     template <class Object>

@@ -22,6 +22,7 @@ struct Silence {
 struct BusSetup {
     std::vector<std::string> names;                   // as the user gives them; see apps/bus/bus.h
     std::optional<tcu::Calibration> built_in;         // the reference controller on `inprocess`
+    std::string calibration_path;                     // where that was read from
     std::vector<Silence> silences;                    // of the built-in controller
     bool lockstep = false;
 };

@@ -83,7 +83,8 @@ void choose_controller(const Choices& choices, Setup& setup) {
     buses.silences = scripted.silences;
     if (!is_built_in(controller)) return;
     const std::string given = controller.size() > 8 ? controller.substr(8) : scripted.calibration;
-    buses.built_in = tcu::read_calibration(given.empty() ? shipped_calibration : given);
+    buses.calibration_path = given.empty() ? shipped_calibration : given;
+    buses.built_in = tcu::read_calibration(buses.calibration_path);
 }
 
 Setup complete(const Choices& choices, Setup setup) {

@@ -94,6 +94,7 @@ void Rig::begin() {
             signals_.value[static_cast<std::size_t>(find_settable(signals_, settable_, scenario.path, setting.quantity))] =
                 setting.value;
         copy_inputs();
+        if (setup_.resumes) return;
         plant::Start start;
         start.locked = scenario.start.locked;
         for (const auto& speed : scenario.start.speeds) start.speeds.emplace_back(speed.quantity.signal, speed.value);

@@ -42,6 +42,7 @@ struct Setup {
     int substeps = 1;                  // plant steps per tick
     plant::KernelKind kernel = plant::KernelKind::automatic;
     BusSetup buses;
+    bool resumes = false;  // a snapshot follows: the scenario's start and settling are left out
 };
 
 // The rig's own signals in the table, by index.

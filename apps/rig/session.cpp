@@ -24,7 +24,10 @@ void Session::tick(const rt::Tick& t) {
     if (options_.before) options_.before(rig_, t);
 
     const std::int64_t began = clock_.now();
-    rig_.report_timing(loop_.report().overruns, static_cast<double>(compute_ns_) / static_cast<double>(options_.loop.period));
+    // Without a wall clock no signal depends on it: two runs give the same recording.
+    const bool by_the_clock = options_.loop.pace == rt::Pace::wall;
+    const double load = static_cast<double>(compute_ns_) / static_cast<double>(options_.loop.period);
+    rig_.report_timing(loop_.report().overruns, by_the_clock ? load : 0);
     rig_.tick();
     const std::int64_t ended = clock_.now();
     compute_ns_ = ended - began;
@@ -75,6 +78,7 @@ io::Manifest manifest_of(const Rig& rig, const rt::LoopSettings& loop) {
     std::string buses;
     for (const auto& name : setup.buses.names) buses += (buses.empty() ? "" : " ") + name;
     m.facts["buses"] = buses;
+    if (!setup.buses.calibration_path.empty()) m.facts["calibration"] = setup.buses.calibration_path;
     m.step_size = model.step_size();
     m.substeps = setup.substeps;
     m.tick_ns = setup.tick_ns;

@@ -12,6 +12,7 @@
 
 #include "analysis/scorecard.h"
 #include "apps/rig/session.h"
+#include "apps/rig/snapshot.h"
 #include "apps/shiftrig/child.h"
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/live_line.h"
@@ -20,6 +21,7 @@
 #include "io/recording/csv.h"
 #include "io/recording/event_names.h"
 #include "io/recording/reader.h"
+#include "io/recording/snapshot.h"
 
 namespace shiftrig::cli {
 
@@ -27,8 +29,25 @@ namespace {
 
 struct RunOptions : RigOptions {
     std::string record, csv, trace;
+    std::pair<double, std::string> snapshot_at{-1, ""};  // time [s], file
+    std::string from;                                    // snapshot to go on from
     bool json = false;
 };
+
+// A new rig, or one that goes on from a snapshot.
+std::unique_ptr<rig::Rig> make_rig(const RunOptions& options) {
+    if (options.from.empty()) {
+        rig::Choices choices = options.choices;
+        choices.lockstep = options.pacing() == rt::Pace::lockstep;
+        return std::make_unique<rig::Rig>(rig::make_setup(choices));
+    }
+    if (!options.choices.model.empty() || !options.choices.scenario.empty())
+        throw std::invalid_argument("--from brings its own model and scenario");
+    const io::Manifest snapshot = io::read_snapshot(options.from);
+    auto rig = std::make_unique<rig::Rig>(rig::setup_of(snapshot));
+    rig::resume(*rig, snapshot);
+    return rig;
+}
 
 // SIGINT and SIGTERM end the run as if its time were over.
 std::atomic<rt::LoopControl*> running{nullptr};
@@ -149,14 +168,16 @@ void print_summary(const rig::Rig& rig, const rt::LoopReport& report, const anal
 }
 
 int run(const RunOptions& options) {
-    rig::Choices choices = options.choices;
-    choices.lockstep = options.pacing() == rt::Pace::lockstep;
-    rig::Rig rig(rig::make_setup(choices));
+    const auto owned = make_rig(options);
+    rig::Rig& rig = *owned;
     for (const auto& warning : rig.buses().warnings()) std::cerr << warning << '\n';
 
     rt::AwakeProcessors awake;
     rt::Refusals refusals = prepare_process(options, awake);
-    const rt::LoopSettings loop = options.loop(rig.setup());
+    rt::LoopSettings loop = options.loop(rig.setup());
+    if (loop.slots > 0) loop.slots = std::max<std::int64_t>(0, loop.slots - rig.ticks());  // a snapshot has done some
+    std::optional<rig::SnapshotTaker> taker;
+    if (options.snapshot_at.first >= 0) taker.emplace(rig, options.snapshot_at.first);
     Beside beside = prepare(options, rig, loop);
     LiveLine live(rig);
 
@@ -165,7 +186,10 @@ int run(const RunOptions& options) {
     session_options.recording = beside.recording.get();
     session_options.collector = beside.collector.get();
     session_options.trace = beside.trace.get();
-    session_options.after = [&live](rig::Rig& each, const rt::Tick&) { live.take(each); };
+    session_options.after = [&](rig::Rig& each, const rt::Tick&) {
+        live.take(each);
+        if (taker) taker->offer(each);
+    };
     rig::Session session(rig, std::move(session_options));
 
     std::optional<Child> controller;
@@ -185,6 +209,7 @@ int run(const RunOptions& options) {
 
     const auto& report = session.report();
     const analysis::Run collected = beside.collector->finish(rig);
+    if (taker) taker->write(options.snapshot_at.second, rig, loop, collected);
     const auto scorecard = analysis::score(collected);
     if (options.json)
         std::cout << result_json(rig, report, collected, scorecard).dump() << '\n';
@@ -199,6 +224,8 @@ Command::Run declare(CLI::App& app) {
     options->add_to(app);
     app.add_option("--record", options->record, "recording (an LCM log; .zst compresses)");
     app.add_option("--csv", options->csv, "every signal of every tick");
+    app.add_option("--snapshot-at", options->snapshot_at, "copy the rig at this time [s] into this file");
+    app.add_option("--from", options->from, "go on from a snapshot; --duration counts from the start of its run");
     app.add_option("--trace", options->trace, "what the loop did when, for ui.perfetto.dev");
     app.add_flag("--json", options->json, "end with one JSON object on standard output");
     return [options] { return run(*options); };

@@ -43,6 +43,9 @@ struct Manifest {
     std::vector<std::string> devices;            // plant::Model::device_names()
 
     std::vector<std::byte> initial_state;  // plant::State::bytes() before the first tick
+    // Of a snapshot, else empty: the changing parts of the whole assembly (io/archive.h), in the bytes of the
+    // program that wrote them, and what the run was like before (whoever writes it knows the format).
+    std::vector<std::byte> assembly, history;
 
     std::string model_hash() const;     // SHA-256 of model_text, hexadecimal (what sha256sum prints)
     std::string scenario_hash() const;  // of scenario_text, empty if there was none

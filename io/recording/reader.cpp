@@ -119,7 +119,7 @@ const plant::Signal& RecordingReader::signal(Table table, std::size_t index) con
 // ---- before the first tick ------------------------------------------------------------------------------
 
 void RecordingReader::Implementation::read_header() {
-    Collected collected[4];  // manifest, model, scenario, state
+    Collected collected[6];  // by kind: manifest, model, scenario, state, assembly, history
     std::vector<std::int64_t> opening_times;
     while (!collected[3].whole()) {
         if (!source.next(event)) {
@@ -140,7 +140,7 @@ void RecordingReader::Implementation::read_header() {
             throw RecordingError(path +
                                  ": was written with another layout of record_chunk_t than this program's");
         const bool sound =
-            decoded == Decoded::whole && event.number == number && chunk.kind >= 1 && chunk.kind <= 4;
+            decoded == Decoded::whole && event.number == number && chunk.kind >= 1 && chunk.kind <= 6;
         if (!sound || !collected[chunk.kind - 1].add(chunk)) {
             damaged("an opening record");
             throw RecordingError(complaint);
@@ -161,6 +161,8 @@ void RecordingReader::Implementation::read_header() {
     manifest.model_text = collected[1].text();
     manifest.scenario_text = collected[2].text();
     manifest.initial_state = collected[3].bytes;
+    manifest.assembly = collected[4].bytes;
+    manifest.history = collected[5].bytes;
     previous_tick = manifest.first_tick - 1;
     const std::size_t sizes[3] = {manifest.inputs.size(), manifest.outputs.size(), manifest.rig.size()};
     for (int t = 0; t < 3; ++t) known[t].assign(block_count(sizes[t]) * signals_per_block, 0.0);

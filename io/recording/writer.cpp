@@ -93,6 +93,10 @@ void RecordingWriter::begin(const Manifest& original) {
     append(ChunkKind::manifest, manifest.to_json());
     append(ChunkKind::model, manifest.model_text);
     append(ChunkKind::scenario, manifest.scenario_text);
+    if (!manifest.assembly.empty()) {
+        append(ChunkKind::assembly, manifest.assembly);
+        append(ChunkKind::history, manifest.history);
+    }
     append(ChunkKind::state, manifest.initial_state);
     self.write_buffer();
     if (self.failed) throw RecordingError(self.sink.error());
