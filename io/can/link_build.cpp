@@ -87,8 +87,6 @@ CanLink::Data::Data(const Mapping& mapping, CanPort& a_port, SignalTable& signal
     }
     settle_duplicates(mapping, signals);
     build_look_up();
-    spread_phases();
-    judge_load(mapping);
 
     const auto position = [](const auto& messages, const std::string& name) {
         for (std::size_t i = 0; i < messages.size(); ++i)
@@ -102,12 +100,10 @@ CanLink::Data::Data(const Mapping& mapping, CanPort& a_port, SignalTable& signal
         fail(mapping, 0, 0,
              "lockstep: the rig must send " + mapping.question + " and the controller " + mapping.answer);
 
-    valid_index = signals.find("bus.command_valid");
-    if (valid_index < 0)
-        valid_index =
-            signals.add({.name = "bus.command_valid",
-                         .initial = 1,
-                         .description = "1 while every command message has been trusted within its timeout"});
+    spread_phases();
+    judge_load(mapping);
+    valid_index = own_signal(signals, "bus.command_valid",
+                             "1 while every command message has been trusted within its timeout", 1);
 }
 
 // ---- one signal --------------------------------------------------------------------------------------------
@@ -348,6 +344,12 @@ void CanLink::Data::spread_phases() {
     }
     std::stable_sort(order.begin(), order.end(), [](auto* a, auto* b) { return a->cycle_ns < b->cycle_ns; });
     std::vector<int> frames(static_cast<std::size_t>(horizon), 0);
+    // The question of lockstep comes at the end of its cycle, when everything else has been told.
+    if (options.role == Role::rig && question >= 0) {
+        auto& asking = sent[static_cast<std::size_t>(question)];
+        if (asking.phase_ns < 0 && asking.cycle_ns > 0)
+            asking.phase_ns = (ticks(asking.cycle_ns) - 1) * options.tick_ns;
+    }
     for (auto* message : order) {
         const std::int64_t cycle = ticks(message->cycle_ns);
         std::int64_t best = 0;
