@@ -285,7 +285,9 @@ class Builder {
         }
     }
 
-    // Speeds that gears and rows allow, from rest in a quarter of the systems.
+    // From rest in a quarter of the systems. Otherwise speeds that gears and rows allow and that turn the ends
+    // of a shaft together, plus a swing whose shaft torques stay within a few times the machine's own: two
+    // masses that meet a stiff shaft at 100 rad/s of difference are a crash, not a driveline.
     void set_in_motion() {
         if (dice_.chance(0.25)) {
             trait("rest");
@@ -297,13 +299,15 @@ class Builder {
             while (d().masses[static_cast<std::size_t>(i)].name != mass_name) ++i;
             return i;
         };
-        Eigen::VectorXd omega(n), j(n);
+        Eigen::VectorXd motion(n), swing(n), root(n);
         for (Eigen::Index i = 0; i < n; ++i) {
-            omega[i] = dice_.chance(0.2) ? 0 : dice_.uniform(-100, 100);
-            j[i] = d().masses[static_cast<std::size_t>(i)].inertia;
+            motion[i] = dice_.chance(0.2) ? 0 : dice_.uniform(-100, 100);
+            swing[i] = dice_.uniform(-1, 1);
+            root[i] = std::sqrt(d().masses[static_cast<std::size_t>(i)].inertia);
         }
-        Eigen::MatrixXd c =
-            Eigen::MatrixXd::Zero(n, static_cast<Eigen::Index>(d().gears.size() + d().planetaries.size()));
+        const auto rigid = static_cast<Eigen::Index>(d().gears.size() + d().planetaries.size());
+        const auto shafts = static_cast<Eigen::Index>(d().shafts.size());
+        Eigen::MatrixXd c = Eigen::MatrixXd::Zero(n, rigid + shafts);
         Eigen::Index column = 0;
         for (const auto& g : d().gears) {
             c(index(g.a), column) = 1;
@@ -314,13 +318,31 @@ class Builder {
             c(index(r.ring), column) = -r.ratio;
             c(index(r.carrier), column++) = r.ratio - 1;
         }
-        if (c.cols() > 0) {
-            const Eigen::MatrixXd jc = j.cwiseInverse().asDiagonal() * c;
-            omega -= jc * (c.transpose() * jc).ldlt().solve(c.transpose() * omega);
+        for (const auto& s : d().shafts) {
+            c(index(s.a), column) = 1;
+            c(index(s.b), column++) = -1;
         }
-        const double largest = omega.lpNorm<Eigen::Infinity>();
-        if (largest > 300) omega *= 300 / largest;
-        for (Eigen::Index i = 0; i < n; ++i) d().masses[static_cast<std::size_t>(i)].initial_speed = omega[i];
+        const auto allowed = [&](const Eigen::VectorXd& omega, Eigen::Index columns) -> Eigen::VectorXd {
+            if (columns == 0) return omega;
+            const Eigen::MatrixXd scaled = root.cwiseInverse().asDiagonal() * c.leftCols(columns);
+            const Eigen::VectorXd v = root.cwiseProduct(omega);
+            const Eigen::VectorXd kept = v - scaled * scaled.completeOrthogonalDecomposition().solve(v);
+            return root.cwiseInverse().cwiseProduct(kept);
+        };
+        motion = allowed(motion, rigid + shafts);
+        swing = allowed(swing, rigid);
+        double torque = 1e-9 * torque_level_;  // that the swing brings to the hardest shaft [Nm]
+        for (Eigen::Index e = 0; e < shafts; ++e) {
+            const auto& shaft = d().shafts[static_cast<std::size_t>(e)];
+            const double j = std::min(inertia(shaft.a), inertia(shaft.b));
+            torque = std::max(torque, std::abs(c.col(rigid + e).dot(swing)) *
+                                          (std::sqrt(shaft.stiffness * j) + shaft.damping));
+        }
+        motion += swing * std::min(30.0, dice_.uniform(0, 3) * torque_level_ / torque);
+        const double largest = motion.lpNorm<Eigen::Infinity>();
+        if (largest > 300) motion *= 300 / largest;
+        for (Eigen::Index i = 0; i < n; ++i)
+            d().masses[static_cast<std::size_t>(i)].initial_speed = motion[i];
     }
 
     Dice dice_;
