@@ -35,100 +35,7 @@ constexpr double explicit_table[stages][stages] = {
     {5535828885825. / 10492691773637, 788022342437. / 10882634858940},
     {6485989280629. / 16251701735622, -4246266847089. / 9704473918619, 10755448449292. / 10357097424841}};
 
-// Working vectors by group; auxiliary rates by stage.
-struct Vectors {
-    double *momentum, *twist, *speed, *right, *star_twist;
-    double *shaft[stages], *rate[stages], *force[stages];  // N, δ, Q
-    double *inverse, *lower;                               // of a partial step
-    double* auxiliary[stages];
-
-    Vectors(const ModelData& m, double* memory) {
-        const auto take = [&memory](int count) {
-            double* const at = memory;
-            memory += count;
-            return at;
-        };
-        for (double** vector : {&momentum, &twist, &speed, &right, &star_twist, &inverse, &lower})
-            *vector = take(m.masses);
-        for (int i = 0; i < stages; ++i) {
-            shaft[i] = take(m.masses);
-            rate[i] = take(m.masses);
-            force[i] = take(m.masses);
-            auxiliary[i] = take(m.auxiliary);
-        }
-    }
-};
-
-// Σ of the sample's forces on every group.
-void group_forces(const ModelData& m, const TreeMode& t, const double* f, double* force) {
-    std::fill(force, force + t.groups, 0.);
-    for (int k = 0; k < m.forces; ++k) {
-        if (f[k] == 0) continue;
-        for (const Link& link : m.force_columns[static_cast<std::size_t>(k)]) {
-            if (link.mass < 0) continue;
-            const int p = m.tree->position[static_cast<std::size_t>(link.mass)];
-            force[t.group[p]] -= t.force_ratio[p] * link.factor * f[k];
-        }
-    }
-}
-
-// δ of every group towards its parent.
-void differences(const TreeMode& t, const double* speed, double* rate) {
-    for (int g = 0; g < t.groups; ++g) rate[g] = t.parent[g] < 0 ? 0 : speed[g] - speed[t.parent[g]];
-}
-
-// Twists of the sample in the groups' measure and back.
-void read_state(const ModelData& m, const TreeMode& t, const double* z, double* speed, double* twist) {
-    const TreeTopology& topology = *m.tree;
-    for (int g = 0; g < t.groups; ++g) {
-        const int p = t.first[g];
-        const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
-        speed[g] = t.grounded[g] ? 0 : z[topology.mass[static_cast<std::size_t>(p)]] / t.ratio[p];
-        twist[g] = edge.shaft < 0 ? 0 : edge.sign * z[m.masses + edge.shaft] / t.ratio[p];
-    }
-}
-
-void write_speeds(const ModelData& m, const TreeMode& t, const double* speed, double* z) {
-    for (int p = 0; p < m.masses; ++p)
-        z[m.tree->mass[static_cast<std::size_t>(p)]] = t.ratio[p] * speed[t.group[p]];
-}
-
-void write_twists(const ModelData& m, const TreeMode& t, const double* twist, double* z) {
-    for (int g = 0; g < t.groups; ++g) {
-        const int p = t.first[g];
-        const TreeTopology::Edge& edge = m.tree->edges[static_cast<std::size_t>(p)];
-        if (edge.shaft >= 0) z[m.masses + edge.shaft] = edge.sign * t.ratio[p] * twist[g];
-    }
-    std::fill(z + m.states, z + m.states_padded, 0.);
-}
-
-// Shaft torques N at given twists and differences.
-void shaft_torques(const TreeMode& t, const double* speed, const double* twist, const double* rate,
-                   double* torque) {
-    for (int g = 0; g < t.groups; ++g) torque[g] = -t.drag[g] * speed[g];
-    for (int g = t.groups - 1; g >= 0; --g) {
-        if (t.parent[g] < 0) continue;
-        const double passed = t.stiffness[g] * twist[g] + t.damping[g] * rate[g];
-        torque[g] -= passed;
-        torque[t.parent[g]] += passed;
-    }
-}
-
-// q from (M + hγ D + (hγ)² K) q = p* − hγ K ψ*; p* comes in `right` and is kept in `momentum`.
-void solve_stage(const TreeMode& t, double weight, const double* inverse, const double* lower,
-                 const double* twist, double* right, double* speed) {
-    for (int g = t.groups - 1; g >= 0; --g) {
-        if (t.parent[g] < 0) continue;
-        const double passed = weight * t.stiffness[g] * twist[g];
-        right[g] -= passed;
-        right[t.parent[g]] += passed + lower[g] * right[g];
-    }
-    for (int g = 0; g < t.groups; ++g) {
-        speed[g] = inverse[g] * right[g];
-        if (t.parent[g] >= 0) speed[g] += lower[g] * speed[t.parent[g]];
-    }
-}
-
+// The sample half way, for the search of the instant at which a locked pair gives way.
 void middle_sample(Work& w, const Mode& mode) {
     Sample &begin = w.scratch.begin, &half = w.scratch.half, &end = w.scratch.end;
     const double h = end.at.time - begin.at.time;
@@ -151,87 +58,149 @@ bool is_overloaded(const Work& w, const Sample& s) {
     return false;
 }
 
-}  // namespace
-
-int tree_workspace_doubles(const ModelData& m) noexcept {
-    return (7 + 3 * stages) * m.masses + stages * m.auxiliary + 4 * m.masses;
+// What the force laws need of z, from the groups' speeds.
+void show_speeds(const TreeMode& t, const double* speed, double* z) {
+    for (int i = 0; i < t.observed_count; ++i)
+        z[t.observed[i].mass] = t.observed[i].ratio * speed[t.observed[i].group];
 }
+
+void write_state(const ModelData& m, const TreeMode& t, const GroupState& s, double* z) {
+    const TreeTopology& topology = *m.tree;
+    for (int p = 0; p < m.masses; ++p)
+        z[topology.mass[static_cast<std::size_t>(p)]] = t.ratio[p] * s.speed[t.group[p]];
+    for (int g = 0; g < t.paths.groups; ++g) {
+        const int p = t.first[g];
+        const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
+        if (edge.shaft >= 0) z[m.masses + edge.shaft] = edge.sign * t.ratio[p] * s.twist[g];
+    }
+    std::fill(z + m.states, z + m.states_padded, 0.);
+}
+
+}  // namespace
 
 void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
     const TreeMode& t = *mode.tree;
+    const TreeKernel& kernel = m.tree->kernel;
+    TreeWork v(m, s.workspace.data());
     const Sample& begin = s.begin;
     Sample &stage = s.late, &end = s.end;
     const double from = begin.at.fraction, length = end_fraction - from;
-    const double h = length * w.h, weight = h * gamma;
-    Vectors v(m, s.workspace.data() + 4 * m.masses);
-    const bool whole = from == 0 && end_fraction == 1;
+    const double h = length * w.h, weight = h * ark3_gamma;
     const double *inverse = t.inverse, *lower = t.lower;
-    if (!whole) {
+    if (from != 0 || end_fraction != 1) {
         factor_stage(t, weight, v.inverse, v.lower);
         inverse = v.inverse;
         lower = v.lower;
     }
 
-    read_state(m, t, begin.z, v.speed, v.twist);
-    for (int g = 0; g < t.groups; ++g) v.momentum[g] = t.mass[g] * v.speed[g];
-    differences(t, v.speed, v.rate[0]);
-    shaft_torques(t, v.speed, v.twist, v.rate[0], v.shaft[0]);
-    group_forces(m, t, begin.f, v.force[0]);
+    if (s.begin_groups != &mode) {
+        read_groups(m, t, begin.z, v.begin);
+        group_forces(m, t, begin.f, v.begin.force);
+    }
+    for (int g = 0; g < t.paths.groups; ++g) v.momentum[g] = t.mass[g] * v.begin.speed[g];
     std::copy(begin.auxiliary_rate, begin.auxiliary_rate + m.auxiliary, v.auxiliary[0]);
 
+    StageSums sums;
+    sums.torque[0] = v.begin.torque;
+    sums.force[0] = v.begin.force;
+    sums.rate[0] = v.begin.rate;
     for (int i = 1; i < stages; ++i) {
-        for (int g = 0; g < t.groups; ++g) {
-            double momentum = 0, twist = 0;
-            for (int j = 0; j < i; ++j) {
-                momentum += implicit_table[i][j] * v.shaft[j][g] + explicit_table[i][j] * v.force[j][g];
-                twist += implicit_table[i][j] * v.rate[j][g];
-            }
-            v.shaft[i][g] = v.right[g] = v.momentum[g] + h * momentum;
-            v.star_twist[g] = v.twist[g] + h * twist;
+        sums.count = i;
+        for (int j = 0; j < i; ++j) {
+            sums.implicit_weight[j] = h * implicit_table[i][j];
+            sums.explicit_weight[j] = h * explicit_table[i][j];
         }
-        solve_stage(t, weight, inverse, lower, v.star_twist, v.right, v.speed);
-        differences(t, v.speed, v.rate[i]);
-        for (int g = 0; g < t.groups; ++g) v.shaft[i][g] = (t.mass[g] * v.speed[g] - v.shaft[i][g]) / weight;
+        kernel.stage(t.paths, sums, v.momentum, v.begin.twist, weight, inverse, lower, v.right, v.star_twist,
+                     v.stage_speed, v.stage_rate[i - 1], v.stage_torque[i - 1]);
 
-        const double fraction = i == stages - 1 ? end_fraction : from + nodes[i] * length;
-        stage.at = {w.start + fraction * w.h, fraction, i == stages - 1 ? Side::left : Side::right};
+        const bool last = i == stages - 1;
+        const double fraction = last ? end_fraction : from + nodes[i] * length;
+        stage.at = {w.start + fraction * w.h, fraction, last ? Side::left : Side::right};
         for (int a = 0; a < m.auxiliary; ++a) {
             double change = 0;
             for (int j = 0; j < i; ++j) change += explicit_table[i][j] * v.auxiliary[j][a];
             stage.auxiliary[a] = begin.auxiliary[a] + h * change;
         }
-        for (int p : m.tree->observed) {
-            stage.z[m.tree->mass[static_cast<std::size_t>(p)]] = t.ratio[p] * v.speed[t.group[p]];
-        }
-        evaluate_forces(w, w.contact, stage);
-        group_forces(m, t, stage.f, v.force[i]);
+        show_speeds(t, v.stage_speed, stage.z);
+        evaluate_forces(w, w.contact, stage, Extent::moving_pairs);
+        group_forces(m, t, stage.f, v.stage_force[i - 1]);
         std::copy(stage.auxiliary_rate, stage.auxiliary_rate + m.auxiliary, v.auxiliary[i]);
+        sums.torque[i] = v.stage_torque[i - 1];
+        sums.force[i] = v.stage_force[i - 1];
+        sums.rate[i] = v.stage_rate[i - 1];
     }
 
-    for (int g = 0; g < t.groups; ++g) {
-        double momentum = 0, twist = 0;
-        for (int j = 0; j < stages; ++j) {
-            momentum += weights[j] * (v.shaft[j][g] + v.force[j][g]);
-            twist += weights[j] * v.rate[j][g];
-        }
-        v.speed[g] = t.grounded[g] ? 0 : (v.momentum[g] + h * momentum) / t.mass[g];
-        v.twist[g] += h * twist;
+    // The implicit table ends with b: the last stage needs only what its explicit part lacks.
+    FinalSums final;
+    final.weight = weight;
+    for (int j = 0; j < stages; ++j) {
+        final.correction[j] = h * (weights[j] - explicit_table[stages - 1][j]);
+        final.force[j] = sums.force[j];
     }
+    final.last_speed = v.stage_speed;
+    final.last_rate = v.stage_rate[stages - 2];
+    final.star_twist = v.star_twist;
+    kernel.finish(t.paths, final, v.end.speed, v.end.twist);
+    kernel.shaft_torques(t.paths, v.end.speed, v.end.twist, v.end.rate, v.end.passed, v.end.torque);
     for (int a = 0; a < m.auxiliary; ++a) {
         double change = 0;
         for (int j = 0; j < stages; ++j) change += weights[j] * v.auxiliary[j][a];
         end.auxiliary[a] = begin.auxiliary[a] + h * change;
     }
-    write_speeds(m, t, v.speed, end.z);
-    write_twists(m, t, v.twist, end.z);
+    write_state(m, t, v.end, end.z);
     end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
     evaluate_forces(w, w.contact, end);
-    tree_internal_torques(w, mode, end);
+    group_forces(m, t, end.f, v.end.force);
+    s.torque_residual = rigid_torques(w, mode, v.end, end);
     const double middle = 0.5 * (from + end_fraction);
     s.half.at = {w.start + middle * w.h, middle, Side::right};
     if (is_overloaded(w, end)) middle_sample(w, mode);
+}
+
+double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    ScratchData& s = w.scratch;
+    const TreeMode& t = *mode.tree;
+    TreeWork v(m, s.workspace.data());
+    if (s.begin_groups != &mode) {
+        read_groups(m, t, s.begin.z, v.begin);
+        group_forces(m, t, s.begin.f, v.begin.force);
+    }
+    const double h = s.end.at.time - s.begin.at.time;
+    const MiddleSums sums{h,
+                          {v.begin.speed, v.end.speed},
+                          {v.begin.torque, v.end.torque},
+                          {v.begin.force, v.end.force},
+                          {v.begin.rate, v.end.rate},
+                          t.loss,
+                          t.drag_loss};
+    const double loss = h / 6 * m.tree->kernel.middle(t.paths, sums, v.other.speed, v.other.rate);
+    for (int i = 0; i < m.auxiliary; ++i) {
+        s.middle.auxiliary[i] = 0.5 * (s.begin.auxiliary[i] + s.end.auxiliary[i]) +
+                                h / 8 * (s.begin.auxiliary_rate[i] - s.end.auxiliary_rate[i]);
+    }
+    show_speeds(t, v.other.speed, s.middle.z);
+    for (int j : m.translating) {
+        const int g = t.group[m.tree->position[static_cast<std::size_t>(j)]];
+        s.end.rate[j] = t.ratio[m.tree->position[static_cast<std::size_t>(j)]] *
+                        (v.end.torque[g] + v.end.force[g]) * t.inverse_mass[g];
+    }
+    s.middle.at = s.half.at;
+    evaluate_forces(w, w.contact, s.middle, Extent::moving_pairs);
+    if (m.tree->lossy) {
+        // Twists half way as well, for the torques of the gears.
+        for (int g = 0; g < t.paths.groups; ++g) {
+            v.other.twist[g] =
+                0.5 * (v.begin.twist[g] + v.end.twist[g]) + h / 8 * (v.begin.rate[g] - v.end.rate[g]);
+        }
+        m.tree->kernel.shaft_torques(t.paths, v.other.speed, v.other.twist, v.other.rate, v.other.passed,
+                                     v.other.torque);
+        group_forces(m, t, s.middle.f, v.other.force);
+        rigid_torques(w, mode, v.other, s.middle);
+    }
+    return loss;
 }
 
 }  // namespace shiftrig::plant::detail

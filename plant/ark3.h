@@ -13,7 +13,8 @@ inline constexpr double ark3_gamma = 1767732205903. / 4055673282236;
 // and internal torques, and half where a locked pair is overloaded at the end.
 void advance_tree(Work& work, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME;
 
-// Doubles of working memory it needs in ScratchData::workspace.
-int tree_workspace_doubles(const ModelData& model) noexcept;
+// The middle sample of the part just computed, as book() of ledger.h needs it, by Hermite's cubic; also the acceleration
+// of translating masses at the end. Returns the energy lost in dampers of shafts and to the housing [J].
+double tree_middle(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

@@ -26,6 +26,7 @@ void reset(Outputs& outputs, ScratchData& scratch) {
     outputs.event_count = 0;
     std::fill(scratch.heat.begin(), scratch.heat.end(), 0.);
     scratch.dissipated = scratch.input_work = 0;
+    scratch.begin_groups = nullptr;
 }
 
 double input(const Work& w, int index) { return index < 0 ? 0 : w.scratch.input[static_cast<std::size_t>(index)]; }
@@ -227,6 +228,7 @@ void accept(Work& w) SHIFTRIG_REALTIME {
     std::copy(end.holding, end.holding + m.pairs, begin.holding);
     std::copy(end.torque, end.torque + m.torques, begin.torque);
     begin.at = {end.at.time, end.at.fraction, Side::right};
+    w.scratch.begin_groups = nullptr;
 }
 
 void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
@@ -250,7 +252,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     block[layout.energy + 1] += s.dissipated;
 
     certificate.energy_defect = stored_energy(m, s.begin.z) - before - s.input_work + s.dissipated;
-    certificate.torque_residual = torque_residual(w, mode, s.end);
+    certificate.torque_residual = mode.tree ? s.torque_residual : torque_residual(w, mode, s.end);
     certificate.constraint_violation = constraint_violation(w, mode, s.begin.z);
     certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     double sum = 0;

@@ -77,7 +77,7 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
     at_oil_temperature(m, w.operators, input(w, m.oil_temperature));
 }
 
-void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHIFTRIG_REALTIME {
+void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s, Extent extent) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const Description& d = m.description;
     const int external = m.pairs + static_cast<int>(std::count_if(m.bearing_force.begin(), m.bearing_force.end(),
@@ -137,7 +137,13 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHI
         const int body = m.road_mass[i];
         drive(body, grade_force(road, input(w, m.grade), d.gravity) + air_force(road, s.z[body]));
     }
-    for (int k = 0; k < m.pairs; ++k) capacities(w, k, s);
+    for (int k = 0; k < m.pairs; ++k) {
+        if (extent == Extent::moving_pairs && contact[k] == locked) {
+            s.sliding[k] = s.holding[k] = 0;
+        } else {
+            capacities(w, k, s);
+        }
+    }
     contact_forces(w, contact, s);
 }
 

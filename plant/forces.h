@@ -39,7 +39,10 @@ bool is_pressed(const Work& work, int pair, const Instant& at) SHIFTRIG_REALTIME
 
 // From z and the auxiliary states of the sample, with the contact states `contact`: capacities, forces f,
 // auxiliary rates and powers.
-void evaluate_forces(const Work& work, const unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;
+// Inside a step nobody asks what locked pairs could hold: `moving_pairs` leaves them out.
+enum class Extent { all_pairs, moving_pairs };
+void evaluate_forces(const Work& work, const unsigned char* contact, Sample& sample,
+                     Extent extent = Extent::all_pairs) SHIFTRIG_REALTIME;
 
 // The part of f that depends on the contact states, from capacities already there.
 void contact_forces(const Work& work, const unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;

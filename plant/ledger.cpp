@@ -2,13 +2,14 @@
 
 #include <algorithm>
 
+#include "plant/ark3.h"
 #include "plant/transitions.h"
 
 namespace shiftrig::plant::detail {
 namespace {
 
-// Loss of everything but friction pairs at a sample [W].
-double other_losses(const Work& w, const Mode& mode, const Sample& s) {
+// Loss in tyres, converters and meshes at a sample [W].
+double field_and_mesh_losses(const Work& w, const Mode& mode, const Sample& s) {
     const ModelData& m = w.model;
     double power = s.field_power;
     for (int k = 0; k < m.meshes; ++k) {
@@ -23,29 +24,25 @@ double other_losses(const Work& w, const Mode& mode, const Sample& s) {
         const int bearing = m.bearing_force[static_cast<std::size_t>(k)];
         if (bearing >= 0) power += s.f[bearing] * mesh.ratio * turning;
     }
+    return power;
+}
+
+// Loss in dampers and in the damping of shafts [W].
+double damping_losses(const Work& w, const Sample& s) {
+    double power = 0;
     const auto damped = [&](const Elastic& e) {
         if (e.damping == 0) return;
         const double rate = slip_of(e.links, s.z);
         power += e.damping * rate * rate;
     };
-    for (const Elastic& shaft : m.structure.shafts) damped(shaft);
-    for (const Elastic& damper : m.structure.dampers) damped(damper);
+    for (const Elastic& shaft : w.model.structure.shafts) damped(shaft);
+    for (const Elastic& damper : w.model.structure.dampers) damped(damper);
     return power;
 }
 
-}  // namespace
-
-double stored_energy(const ModelData& m, const double* z) SHIFTRIG_REALTIME {
-    double energy = 0;
-    for (int j = 0; j < m.masses; ++j) energy += 0.5 * m.structure.inertia[static_cast<std::size_t>(j)] * z[j] * z[j];
-    for (int e = 0; e < m.twists; ++e) {
-        const double twist = z[m.masses + e];
-        energy += 0.5 * m.structure.shafts[static_cast<std::size_t>(e)].stiffness * twist * twist;
-    }
-    return energy;
-}
-
-void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+// The state half way from Hermite's cubic, with its forces and internal torques; returns the energy lost by
+// damping [J].
+double fill_middle(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
     Sample &begin = w.scratch.begin, &middle = w.scratch.middle, &end = w.scratch.end;
     const double h = end.at.time - begin.at.time;
@@ -61,17 +58,40 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     middle.at = w.scratch.half.at;
     evaluate_forces(w, w.contact, middle);
     internal_torques(w, mode, middle);
+    return h / 6 * (damping_losses(w, begin) + 4 * damping_losses(w, middle) + damping_losses(w, end));
+}
+
+}  // namespace
+
+double stored_energy(const ModelData& m, const double* z) SHIFTRIG_REALTIME {
+    double energy = 0;
+    for (int j = 0; j < m.masses; ++j)
+        energy += 0.5 * m.structure.inertia[static_cast<std::size_t>(j)] * z[j] * z[j];
+    for (int e = 0; e < m.twists; ++e) {
+        const double twist = z[m.masses + e];
+        energy += 0.5 * m.structure.shafts[static_cast<std::size_t>(e)].stiffness * twist * twist;
+    }
+    return energy;
+}
+
+void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    Sample &begin = w.scratch.begin, &middle = w.scratch.middle, &end = w.scratch.end;
+    const double h = end.at.time - begin.at.time;
+    w.scratch.dissipated += mode.tree ? tree_middle(w, mode) : fill_middle(w, mode);
 
     const auto simpson = [h](double a, double b, double c) { return h / 6 * (a + 4 * b + c); };
     for (int k = 0; k < m.pairs; ++k) {
         if (w.contact[k] == locked) continue;
         const auto& links = m.structure.pairs[static_cast<std::size_t>(k)].links;
-        const double heat = simpson(begin.f[k] * slip_of(links, begin.z), middle.f[k] * slip_of(links, middle.z),
-                                    end.f[k] * slip_of(links, end.z));
+        const double heat = simpson(begin.f[k] * slip_of(links, begin.z),
+                                    middle.f[k] * slip_of(links, middle.z), end.f[k] * slip_of(links, end.z));
         w.scratch.heat[static_cast<std::size_t>(k)] += heat;
         w.scratch.dissipated += heat;
     }
-    w.scratch.dissipated += simpson(other_losses(w, mode, begin), other_losses(w, mode, middle), other_losses(w, mode, end));
+    w.scratch.dissipated +=
+        simpson(field_and_mesh_losses(w, mode, begin), field_and_mesh_losses(w, mode, middle),
+                field_and_mesh_losses(w, mode, end));
     w.scratch.input_work += simpson(begin.input_power, middle.input_power, end.input_power);
     for (std::size_t i = 0; i < m.translating.size(); ++i) {
         const int j = m.translating[i];

@@ -81,6 +81,7 @@ struct OperatorsData {
     std::vector<int> integers, row_memory;
     std::vector<Mode> modes;
     std::vector<TreeMode> trees;  // one per mode where the model has a tree
+    std::vector<TreeMass> tree_masses;
     std::uint64_t clock = 0;
     Mode* recent = nullptr;
     std::vector<unsigned char> wanted;  // key being looked up

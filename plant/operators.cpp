@@ -58,9 +58,10 @@ void OperatorsData::place_trees(const ModelData& m) {
     memory.assign(modes.size() * sizes.doubles, 0.);
     integers.assign(modes.size() * sizes.integers, 0);
     bytes.assign(modes.size() * sizes.bytes, 0);
+    tree_masses.resize(modes.size() * sizes.masses);
     for (std::size_t i = 0; i < modes.size(); ++i) {
         place_tree(m, trees[i], memory.data() + i * sizes.doubles, integers.data() + i * sizes.integers,
-                   bytes.data() + i * sizes.bytes);
+                   bytes.data() + i * sizes.bytes, tree_masses.data() + i * sizes.masses);
         modes[i].tree = &trees[i];
     }
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "plant/ark3.h"
 #include "plant/modes.h"
 
 namespace shiftrig::plant {
@@ -48,7 +47,7 @@ ScratchData::ScratchData(const ModelData& m) {
     for (auto* vector : {&vector_a, &vector_b, &vector_c}) vector->assign(longest, 0.);
     torque_copy.assign(static_cast<std::size_t>(m.torques), 0.);
     heat.assign(static_cast<std::size_t>(m.pairs), 0.);
-    workspace.assign(static_cast<std::size_t>(m.tree ? tree_workspace_doubles(m) : workspace_doubles(m)), 0.);
+    workspace.assign(static_cast<std::size_t>(m.tree ? TreeWork::doubles(m) : workspace_doubles(m)), 0.);
     if (m.tree) return;
     workspace_index.assign(static_cast<std::size_t>(workspace_integers(m)), 0);
     operator_memory.assign(static_cast<std::size_t>(ModeSizes(m).operators), 0.);

@@ -45,6 +45,8 @@ struct PairLoad {
     bool fixed = false;       // stuck: `values` is the load
 };
 
+struct Mode;
+
 struct ScratchData {
     explicit ScratchData(const ModelData& model);
     std::vector<double> buffer;
@@ -63,6 +65,8 @@ struct ScratchData {
     std::vector<double> workspace;   // of the mode builder
     std::vector<int> workspace_index;
     std::vector<double> operator_memory;
+    const Mode* begin_groups = nullptr;  // mode in which the tree's begin.groups hold for `begin`
+    double torque_residual = 0;          // of the tree's internal torques at `end`
 };
 
 }  // namespace shiftrig::plant::detail

@@ -320,15 +320,15 @@ double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
         return energy;
     };
     const double before = kinetic_energy();
+    double* momentum = w.scratch.vector_a.data();
+    double* joined = w.scratch.vector_b.data();
+    for (int j = 0; j < m.masses; ++j) momentum[j] = m.structure.inertia[static_cast<std::size_t>(j)] * speeds[j];
     if (mode.tree) {
-        tree_join(w, mode, speeds);
+        tree_mobility(w, mode, momentum, joined);
     } else {
-        double* momentum = w.scratch.vector_a.data();
-        double* joined = w.scratch.vector_b.data();
-        for (int j = 0; j < m.masses; ++j) momentum[j] = m.structure.inertia[static_cast<std::size_t>(j)] * speeds[j];
         m.kernel.multiply(mode.mobility, padded(m.masses) / panel_rows, m.masses, momentum, nullptr, joined);
-        std::copy(joined, joined + m.masses, speeds);
     }
+    std::copy(joined, joined + m.masses, speeds);
     return before - kinetic_energy();
 }
 

@@ -21,6 +21,7 @@
 
 #include "plant/realtime.h"
 #include "plant/structure.h"
+#include "plant/tree_kernels.h"
 
 namespace shiftrig::plant::detail {
 
@@ -50,28 +51,53 @@ struct TreeTopology {
     std::vector<Ground> grounds;         // brakes and resistances
     std::vector<double> ground_damping;  // by position [Nm s/rad]
     std::vector<double> weight;          // by unknown: share of a torque that is not unique
-    std::vector<int> observed;           // positions whose speeds the force laws read
+    std::vector<unsigned char> read_by_laws;  // by position: its speed is read by engines, tyres, … or it translates
+    bool lossy = false;                       // any gear with losses
+    TreeKernel kernel;
 };
 
 // The topology, or nothing, with `reason` saying which device makes it no forest.
 std::unique_ptr<TreeTopology> build_topology(const ModelData& model, std::string& reason);
 
+// A mass as the force laws or the torques of a mode see it.
+struct TreeMass {
+    int position = -1, mass = -1, group = -1;
+    double ratio = 0;    // r
+    double inertia = 0;  // r J
+    double drag = 0;     // r times its damping to the housing
+};
+
 // One contact mode on the tree: arrays by position and by group, in one block of memory.
 struct TreeMode {
-    int groups = 0;
+    TreePaths paths;                // groups, their masses and links, as the inner loops see them
     int* group = nullptr;           // by position
     double* ratio = nullptr;        // r, by position
     double* force_ratio = nullptr;  // r̂, by position
     // By group:
-    int* first = nullptr;               // its first position: where it hangs on its parent
-    int* parent = nullptr;              // group, −1: none
+    int* first = nullptr;   // its first position: where it hangs on its parent
+    int* parent = nullptr;  // group, −1: none
+    int* path_begin = nullptr;
+    int* path_parent = nullptr;
     unsigned char* grounded = nullptr;  // 1: held by a closed pair, 2: by a stuck mesh
     double* mass = nullptr;             // M
+    double* inverse_mass = nullptr;     // 1/M, 0 where grounded
     double* drag = nullptr;             // damping to the housing
     double* stiffness = nullptr;        // k' towards the parent
     double* damping = nullptr;          // d'
+    double* loss = nullptr;             // power lost in the link's damper per δ²
+    double* drag_loss = nullptr;        // power lost to the housing per q²
     double* inverse = nullptr;          // 1/D and L of the stage matrix for the model's step size
     double* lower = nullptr;
+    // What the force laws read while a step is under way.
+    int observed_count = 0;
+    TreeMass* observed = nullptr;
+    // Masses of groups with rigid devices inside, and the link torques that act on them.
+    int inner_count = 0;
+    TreeMass* inner = nullptr;
+    int end_count = 0;
+    int* end_group = nullptr;
+    int* end_position = nullptr;
+    double* end_factor = nullptr;
     // Active rigid edges, children first: position of the child, its factors in Ĉ.
     int edge_count = 0;
     int* edge = nullptr;
@@ -84,16 +110,15 @@ struct TreeMode {
     int* ground_position = nullptr;
     int* ground_unknown = nullptr;
     double* ground_factor = nullptr;
-    bool any_grounded = false;
 };
 
 // Memory of one tree mode.
 struct TreeSizes {
-    std::size_t doubles = 0, integers = 0, bytes = 0;
+    std::size_t doubles = 0, integers = 0, bytes = 0, masses = 0;
     explicit TreeSizes(const ModelData& model);
 };
-void place_tree(const ModelData& model, TreeMode& tree, double* doubles, int* integers,
-                unsigned char* bytes) noexcept;
+void place_tree(const ModelData& model, TreeMode& tree, double* doubles, int* integers, unsigned char* bytes,
+                TreeMass* masses) noexcept;
 
 // Fills mode.tree and what a mode says about itself (rows, bound, redundant) from mode.key.
 void build_tree_mode(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
@@ -101,10 +126,46 @@ void build_tree_mode(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
 // L D Lᵀ of M + hγ D' + (hγ)² K' for the weight hγ: 1/D and L by group.
 void factor_stage(const TreeMode& tree, double weight, double* inverse, double* lower) SHIFTRIG_REALTIME;
 
-// The tree's versions of what the dense modes do with matrices (forces.h, transitions.h).
+// ---- motion of the groups -----------------------------------------------------------------------------
+
+// Speeds and twists of the groups at one instant, what the shafts and the other forces do to them.
+struct GroupState {
+    double* speed = nullptr;   // q
+    double* twist = nullptr;   // ψ
+    double* rate = nullptr;    // δ = ψ̇
+    double* passed = nullptr;  // torque of the link to the parent, on the child
+    double* torque = nullptr;  // N, of all links and of damping to the housing
+    double* force = nullptr;   // Q, of everything else
+};
+
+// Working memory of a step on the tree, in ScratchData::workspace.
+struct TreeWork {
+    GroupState begin, end, other;
+    double *momentum, *star_twist, *right, *stage_speed, *inverse, *lower;
+    double *stage_torque[3], *stage_force[3], *stage_rate[3];
+    double* auxiliary[4];
+    double *load, *potential;
+    TreeWork(const ModelData& model, double* memory) noexcept;
+    static int doubles(const ModelData& model) noexcept;
+};
+
+// From a sample's z to q, ψ and all that follows from them; from its f to Q.
+void read_groups(const ModelData& model, const TreeMode& tree, const double* z,
+                 GroupState& groups) SHIFTRIG_REALTIME;
+void group_forces(const ModelData& model, const TreeMode& tree, const double* f,
+                  double* force) SHIFTRIG_REALTIME;
+
+// Internal torques of the sample from its group state; returns their residual relative to the largest load.
+double rigid_torques(const Work& work, const Mode& mode, const GroupState& groups,
+                     Sample& sample) SHIFTRIG_REALTIME;
+
+// ---- the tree's versions of what the dense modes do with matrices (forces.h, transitions.h) ---------------
+
 void tree_internal_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 void tree_sample_rate(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
-void tree_join(const Work& work, const Mode& mode, double* speeds) SHIFTRIG_REALTIME;
+// ω̇ of impulses: change = B impulse.
+void tree_mobility(const Work& work, const Mode& mode, const double* impulse,
+                   double* change) SHIFTRIG_REALTIME;
 
 // Stuck meshes and bound slips that move if mesh `leader` moves: part = ±1 turning with or against it, 0 others. Returns
 // 1/√(reduced inertia) of that motion, 0 if others hold it.

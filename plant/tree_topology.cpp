@@ -116,7 +116,8 @@ class Builder {
         }
         t->weight.resize(s.pairs.size() + 2 * s.meshes.size(),
                          1e3 * heaviest);  // sharing is for friction pairs
-        find_observed(*t);
+        find_readers(*t);
+        t->kernel = choose_tree_kernel(model_.kernel.kind);
         return t;
     }
 
@@ -200,20 +201,25 @@ class Builder {
         return edge;
     }
 
-    void find_observed(TreeTopology& t) const {
-        std::vector<unsigned char> seen(near_.size(), 0);
-        const auto see = [&](int mass) {
-            if (mass >= 0) seen[static_cast<std::size_t>(mass)] = 1;
+    void find_readers(TreeTopology& t) const {
+        t.read_by_laws.assign(near_.size(), 0);
+        const auto read = [&](int mass) {
+            t.read_by_laws[static_cast<std::size_t>(t.position[static_cast<std::size_t>(mass)])] = 1;
         };
-        for (const FrictionPair& pair : model_.structure.pairs) {
-            for (const Link& link : pair.links) see(link.mass);
-        }
         for (std::size_t j = 0; j < near_.size(); ++j) {
-            if (model_.external_force[j] >= 0) see(static_cast<int>(j));
+            if (model_.external_force[j] >= 0) read(static_cast<int>(j));
         }
-        for (int body : model_.road_mass) see(body);
-        for (std::size_t p = 0; p < t.mass.size(); ++p) {
-            if (seen[static_cast<std::size_t>(t.mass[p])]) t.observed.push_back(static_cast<int>(p));
+        for (int mass : model_.translating) read(mass);
+        for (const Mesh& mesh : model_.structure.meshes) {
+            t.lossy = t.lossy || mesh.lossy();
+            read(mesh.first);  // its slip tells when it comes to rest
+            read(mesh.second);
+        }
+        for (const FrictionPair& pair : model_.structure.pairs) {
+            if (pair.kind == PairKind::clutch) continue;  // resistances read the speed of their mass
+            for (const Link& link : pair.links) {
+                if (link.mass >= 0) read(link.mass);
+            }
         }
     }
 

@@ -1,0 +1,13 @@
+// AVX2 with fused multiply-add.
+#if defined(SHIFTRIG_X86_KERNELS)
+#define SHIFTRIG_FMA(a, b, c) __builtin_fma(a, b, c)
+#include "plant/tree_kernels_body.h"
+
+namespace shiftrig::plant::detail {
+
+TreeKernel tree_kernel_avx2() noexcept {
+    return kernel;
+}
+
+}  // namespace shiftrig::plant::detail
+#endif

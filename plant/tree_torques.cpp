@@ -1,0 +1,248 @@
+// Motion and torques of the groups at one instant.
+#include <algorithm>
+#include <cmath>
+
+#include "plant/contact.h"
+#include "plant/forces.h"
+#include "plant/modes.h"
+#include "plant/tree.h"
+
+namespace shiftrig::plant::detail {
+namespace {
+
+constexpr int margin = 8;  // the inner loops may read one element beyond either end
+
+int stride(const ModelData& m) {
+    return padded(m.masses) + 2 * margin;
+}
+
+// Equilibrium inside the grounded groups: adds to the torques what the load leaves, takes it off the load.
+void solve_network(const ModelData& m, const TreeMode& t, double* load, double* potential, double* torque) {
+    const TreeTopology& topology = *m.tree;
+    std::copy(load, load + m.masses, potential);
+    const auto parent = [&](int p) { return topology.edges[static_cast<std::size_t>(p)].parent; };
+    for (int e = 0; e < t.edge_count; ++e) {
+        const int p = t.edge[e];
+        if (t.grounded[t.group[p]]) potential[parent(p)] -= t.network_lower[p] * potential[p];
+    }
+    for (int p = 0; p < m.masses; ++p) {
+        if (!t.grounded[t.group[p]]) continue;
+        potential[p] *= t.network_inverse[p];
+        if (t.first[t.group[p]] != p) potential[p] -= t.network_lower[p] * potential[parent(p)];
+    }
+    const auto pass = [&](int p, double factor, double moment) { load[p] -= factor * moment; };
+    for (int e = 0; e < t.edge_count; ++e) {
+        const int p = t.edge[e];
+        if (!t.grounded[t.group[p]]) continue;
+        const int unknown = topology.edges[static_cast<std::size_t>(p)].rigid;
+        const double moment = topology.weight[static_cast<std::size_t>(unknown)] *
+                              (t.edge_own[e] * potential[p] + t.edge_up[e] * potential[parent(p)]);
+        torque[unknown] += moment;
+        pass(p, t.edge_own[e], moment);
+        pass(parent(p), t.edge_up[e], moment);
+    }
+    for (int i = 0; i < t.ground_count; ++i) {
+        const int p = t.ground_position[i], unknown = t.ground_unknown[i];
+        const double moment =
+            topology.weight[static_cast<std::size_t>(unknown)] * t.ground_factor[i] * potential[p];
+        torque[unknown] += moment;
+        pass(p, t.ground_factor[i], moment);
+    }
+}
+
+}  // namespace
+
+int TreeWork::doubles(const ModelData& m) noexcept {
+    return (3 * 6 + 8 + 3 * 3) * stride(m) + 4 * m.auxiliary;
+}
+
+TreeWork::TreeWork(const ModelData& m, double* memory) noexcept {
+    const auto take = [&, length = stride(m)] {
+        double* const at = memory + margin;
+        memory += length;
+        return at;
+    };
+    for (GroupState* state : {&begin, &end, &other}) {
+        for (double** vector :
+             {&state->speed, &state->twist, &state->rate, &state->passed, &state->torque, &state->force}) {
+            *vector = take();
+        }
+    }
+    for (double** vector :
+         {&momentum, &star_twist, &right, &stage_speed, &inverse, &lower, &load, &potential})
+        *vector = take();
+    for (int i = 0; i < 3; ++i) {
+        stage_torque[i] = take();
+        stage_force[i] = take();
+        stage_rate[i] = take();
+    }
+    for (double*& vector : auxiliary) {
+        vector = memory;
+        memory += m.auxiliary;
+    }
+}
+
+void read_groups(const ModelData& m, const TreeMode& t, const double* z, GroupState& s) SHIFTRIG_REALTIME {
+    const TreeTopology& topology = *m.tree;
+    for (int g = 0; g < t.paths.groups; ++g) {
+        const int p = t.first[g];
+        const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
+        const double inverse = 1 / t.ratio[p];
+        s.speed[g] = t.grounded[g] ? 0 : z[topology.mass[static_cast<std::size_t>(p)]] * inverse;
+        s.twist[g] = edge.shaft < 0 ? 0 : edge.sign * z[m.masses + edge.shaft] * inverse;
+    }
+    topology.kernel.shaft_torques(t.paths, s.speed, s.twist, s.rate, s.passed, s.torque);
+}
+
+void group_forces(const ModelData& m, const TreeMode& t, const double* f, double* force) SHIFTRIG_REALTIME {
+    std::fill(force, force + t.paths.groups, 0.);
+    for (int k = 0; k < m.forces; ++k) {
+        if (f[k] == 0) continue;
+        for (const Link& link : m.force_columns[static_cast<std::size_t>(k)]) {
+            if (link.mass < 0) continue;
+            const int p = m.tree->position[static_cast<std::size_t>(link.mass)];
+            force[t.group[p]] -= t.force_ratio[p] * link.factor * f[k];
+        }
+    }
+}
+
+double rigid_torques(const Work& w, const Mode& mode, const GroupState& groups, Sample& s) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const TreeTopology& topology = *m.tree;
+    const TreeMode& t = *mode.tree;
+    TreeWork work(m, w.scratch.workspace.data());
+    double* load = work.load;  // on each mass that carries rigid devices: M̃ − J ω̇
+    std::fill(s.torque, s.torque + m.torques, 0.);
+    for (int i = 0; i < t.inner_count; ++i) {
+        const TreeMass& mass = t.inner[i];
+        const double acceleration =
+            (groups.torque[mass.group] + groups.force[mass.group]) * t.inverse_mass[mass.group];
+        load[mass.position] = -mass.drag * groups.speed[mass.group] - mass.inertia * acceleration;
+    }
+    for (int i = 0; i < t.end_count; ++i)
+        load[t.end_position[i]] += t.end_factor[i] * groups.passed[t.end_group[i]];
+    for (int k = 0; k < m.forces; ++k) {
+        if (s.f[k] == 0) continue;
+        for (const Link& link : m.force_columns[static_cast<std::size_t>(k)]) {
+            if (link.mass >= 0)
+                load[topology.position[static_cast<std::size_t>(link.mass)]] -= link.factor * s.f[k];
+        }
+    }
+    if (t.ground_count > 0) {
+        // Twice: the second pass takes what rounding left of the first.
+        solve_network(m, t, load, work.potential, s.torque);
+        solve_network(m, t, load, work.potential, s.torque);
+    }
+    double scale = 0;
+    for (int e = 0; e < t.edge_count;
+         ++e) {  // children first: what a subtree does not need passes through its edge
+        const int p = t.edge[e];
+        if (t.grounded[t.group[p]]) continue;
+        const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
+        scale = std::max(scale, std::fabs(load[p]));
+        const double moment = load[p] / t.edge_own[e];
+        s.torque[edge.rigid] = moment;
+        load[edge.parent] -= t.edge_up[e] * moment;
+    }
+    // Nothing may be left over at the groups' first masses, nor anywhere in grounded ones.
+    double rest = 0;
+    for (int i = 0; i < t.inner_count; ++i) {
+        const TreeMass& mass = t.inner[i];
+        if (t.grounded[mass.group] || t.first[mass.group] == mass.position)
+            rest = std::max(rest, std::fabs(load[mass.position]));
+    }
+    for (int k = 0; k < m.pairs; ++k) scale = std::max(scale, std::fabs(s.torque[k]));
+    return scale > 0 ? rest / scale : 0;
+}
+
+void tree_internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    ScratchData& scratch = w.scratch;
+    TreeWork work(m, scratch.workspace.data());
+    GroupState& groups = &s == &scratch.begin ? work.begin : work.other;
+    read_groups(m, *mode.tree, s.z, groups);
+    group_forces(m, *mode.tree, s.f, groups.force);
+    const double residual = rigid_torques(w, mode, groups, s);
+    if (&s == &scratch.begin) scratch.begin_groups = &mode;
+    if (&s == &scratch.end) scratch.torque_residual = residual;
+}
+
+void tree_sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const TreeTopology& topology = *m.tree;
+    const TreeMode& t = *mode.tree;
+    TreeWork work(m, w.scratch.workspace.data());
+    GroupState& groups = work.other;
+    read_groups(m, t, s.z, groups);
+    group_forces(m, t, s.f, groups.force);
+    for (int g = 0; g < t.paths.groups; ++g)
+        groups.torque[g] = (groups.torque[g] + groups.force[g]) * t.inverse_mass[g];
+    for (int p = 0; p < m.masses; ++p) {
+        const auto i = static_cast<std::size_t>(p);
+        const int mass = topology.mass[i];
+        s.rate[mass] = t.ratio[p] * groups.torque[t.group[p]];
+        const TreeTopology::Edge& edge = topology.edges[i];
+        if (edge.shaft < 0) continue;
+        s.rate[m.masses + edge.shaft] =
+            edge.sign * (s.z[mass] - s.z[topology.mass[static_cast<std::size_t>(edge.parent)]]);
+    }
+    std::fill(s.rate + m.states, s.rate + m.states_padded, 0.);
+}
+
+void tree_mobility(const Work& w, const Mode& mode, const double* impulse, double* change) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const TreeTopology& topology = *m.tree;
+    const TreeMode& t = *mode.tree;
+    double* sum = TreeWork(m, w.scratch.workspace.data()).right;
+    std::fill(sum, sum + t.paths.groups, 0.);
+    for (int p = 0; p < m.masses; ++p) {
+        sum[t.group[p]] += t.force_ratio[p] * impulse[topology.mass[static_cast<std::size_t>(p)]];
+    }
+    for (int p = 0; p < m.masses; ++p) {
+        const int g = t.group[p];
+        change[topology.mass[static_cast<std::size_t>(p)]] = t.ratio[p] * (sum[g] * t.inverse_mass[g]);
+    }
+}
+
+double tree_family(const Work& w, const Mode& mode, int leader, signed char* part) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const TreeTopology& topology = *m.tree;
+    const TreeMode& t = *mode.tree;
+    const auto position = [&](int mass) { return topology.position[static_cast<std::size_t>(mass)]; };
+    const Mesh& lead = m.structure.meshes[static_cast<std::size_t>(leader)];
+    const int family = t.group[position(lead.first)];
+    const double direction = t.ratio[position(lead.first)];
+    if (t.grounded[family] == 1) return 0;
+    double inertia = 0;
+    for (int p = 0; p < m.masses; ++p) {
+        if (t.group[p] != family) continue;
+        inertia += m.structure.inertia[static_cast<std::size_t>(topology.mass[static_cast<std::size_t>(p)])] *
+                   t.ratio[p] * t.ratio[p];
+    }
+    const auto relation = [&](const std::array<Link, 2>& links) -> signed char {
+        double motion = 0;
+        for (const Link& link : links) {
+            if (link.mass < 0) continue;
+            const int p = position(link.mass);
+            if (t.group[p] == family) {
+                motion += link.factor * t.ratio[p];
+            } else if (t.grounded[t.group[p]] != 1) {
+                return 0;  // another motion as well
+            }
+        }
+        return static_cast<signed char>(motion == 0 ? 0 : motion * direction < 0 ? -1 : 1);
+    };
+    for (int k = 0; k < m.pairs; ++k) {
+        const bool candidate = slips(w.contact[k]) && mode.bound[k];
+        part[k] = candidate ? relation(m.structure.pairs[static_cast<std::size_t>(k)].links)
+                            : static_cast<signed char>(0);
+    }
+    for (int k = 0; k < m.meshes; ++k) {
+        const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
+        const bool candidate = mesh.lossy() && w.contact[m.pairs + k] == stuck;
+        part[m.pairs + k] = candidate ? relation(mesh.motion()) : static_cast<signed char>(0);
+    }
+    return std::fabs(direction) / std::sqrt(inertia);
+}
+
+}  // namespace shiftrig::plant::detail
