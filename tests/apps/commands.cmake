@@ -12,3 +12,8 @@ add_executable(tractor_test ${CMAKE_CURRENT_LIST_DIR}/tractor_test.cpp)
 target_compile_definitions(tractor_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
 target_link_libraries(tractor_test PRIVATE shiftrig_model GTest::gtest_main)
 gtest_discover_tests(tractor_test)
+
+add_executable(article_test ${CMAKE_CURRENT_LIST_DIR}/article_test.cpp)
+target_compile_definitions(article_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+target_link_libraries(article_test PRIVATE shiftrig_rig GTest::gtest_main)
+gtest_discover_tests(article_test)
