@@ -15,13 +15,6 @@ using plant::Unit;
 
 namespace {
 
-bool starts_with(std::string_view text, std::string_view head) {
-    return text.substr(0, head.size()) == head;
-}
-bool ends_with(std::string_view text, std::string_view tail) {
-    return text.size() >= tail.size() && text.substr(text.size() - tail.size()) == tail;
-}
-
 // One stack of lines: which signals belong to it.
 struct Group {
     const char* title;
@@ -29,37 +22,41 @@ struct Group {
 };
 
 const Group groups[] = {
-    {"Driver", [](const plant::Signal& s) { return starts_with(s.name, "driver.") && s.unit == Unit::one; }},
+    {"Driver", [](const plant::Signal& s) { return s.name.starts_with("driver.") && s.unit == Unit::one; }},
+    {"Clutch pressure commands",
+     [](const plant::Signal& s) {
+         return s.name.starts_with("clutch.") && s.name.ends_with(".pressure_command");
+     }},
     {"Clutch pressures",
-     [](const plant::Signal& s) { return starts_with(s.name, "clutch.") && s.unit == Unit::pascal; }},
+     [](const plant::Signal& s) { return s.name.starts_with("clutch.") && s.name.ends_with(".pressure"); }},
     {"Speeds",
      [](const plant::Signal& s) {
-         return starts_with(s.name, "mass.") && s.unit == Unit::radian_per_second;
+         return s.name.starts_with("mass.") && s.unit == Unit::radian_per_second;
      }},
     {"Vehicle speed",
-     [](const plant::Signal& s) { return starts_with(s.name, "mass.") && s.unit == Unit::metre_per_second; }},
-    {"Vehicle acceleration", [](const plant::Signal& s) { return ends_with(s.name, ".acceleration"); }},
+     [](const plant::Signal& s) { return s.name.starts_with("mass.") && s.unit == Unit::metre_per_second; }},
+    {"Vehicle acceleration", [](const plant::Signal& s) { return s.name.ends_with(".acceleration"); }},
     {"Clutch slip",
-     [](const plant::Signal& s) { return starts_with(s.name, "clutch.") && ends_with(s.name, ".slip"); }},
+     [](const plant::Signal& s) { return s.name.starts_with("clutch.") && s.name.ends_with(".slip"); }},
     {"Shaft torques",
-     [](const plant::Signal& s) { return starts_with(s.name, "shaft.") && ends_with(s.name, ".torque"); }},
+     [](const plant::Signal& s) { return s.name.starts_with("shaft.") && s.name.ends_with(".torque"); }},
     {"Clutch torques",
-     [](const plant::Signal& s) { return starts_with(s.name, "clutch.") && ends_with(s.name, ".torque"); }},
+     [](const plant::Signal& s) { return s.name.starts_with("clutch.") && s.name.ends_with(".torque"); }},
     {"Facing temperatures",
-     [](const plant::Signal& s) { return starts_with(s.name, "clutch.") && s.unit == Unit::celsius; }},
+     [](const plant::Signal& s) { return s.name.starts_with("clutch.") && s.unit == Unit::celsius; }},
     {"Bus and loop",
-     [](const plant::Signal& s) { return starts_with(s.name, "bus.") || starts_with(s.name, "rig."); }},
+     [](const plant::Signal& s) { return s.name.starts_with("bus.") || s.name.starts_with("rig."); }},
 };
 
 // What the driveline picture is painted from, besides the plotted lines.
 bool paints(const plant::Signal& s) {
-    return ends_with(s.name, ".state") || ends_with(s.name, ".direction") ||
-           (starts_with(s.name, "gear.") && ends_with(s.name, ".torque")) || starts_with(s.name, "row.");
+    return s.name.ends_with(".state") || s.name.ends_with(".direction") ||
+           (s.name.starts_with("gear.") && s.name.ends_with(".torque")) || s.name.starts_with("row.");
 }
 
 bool shows(const plant::Signal& signal) {
-    return paints(signal) || starts_with(signal.name, "energy.") ||
-           (starts_with(signal.name, "clutch.") && ends_with(signal.name, ".heat")) ||
+    return paints(signal) || signal.name.starts_with("energy.") ||
+           (signal.name.starts_with("clutch.") && signal.name.ends_with(".heat")) ||
            std::any_of(std::begin(groups), std::end(groups), [&](const Group& g) { return g.takes(signal); });
 }
 
@@ -101,7 +98,7 @@ json energy(const Run& run) {
     const auto* stored = run.column("energy.stored");
     json by_device = json::object();
     for (const auto& column : run.columns)
-        if (starts_with(column.signal.name, "clutch.") && ends_with(column.signal.name, ".heat") &&
+        if (column.signal.name.starts_with("clutch.") && column.signal.name.ends_with(".heat") &&
             !column.value.empty())
             by_device[column.signal.name.substr(7, column.signal.name.size() - 12)] = column.value.back();
     return {{"input_j", at_end("energy.input")},
@@ -195,7 +192,7 @@ std::string report_html(const Run& run, const json& shifts, const ReportOptions&
     data["identity"] = json::object();
     data["loop"] = json::object();
     for (const auto& [name, value] : run.identity) {
-        if (starts_with(name, "loop."))
+        if (name.starts_with("loop."))
             data["loop"][name.substr(5)] = value;
         else
             data["identity"][name] = value;
@@ -203,7 +200,7 @@ std::string report_html(const Run& run, const json& shifts, const ReportOptions&
     }
     data["bus"] = json::array();
     for (const auto& column : run.columns)
-        if (starts_with(column.signal.name, "bus.") && ends_with(column.signal.name, ".status") &&
+        if (column.signal.name.starts_with("bus.") && column.signal.name.ends_with(".status") &&
             !column.value.empty()) {
             static constexpr const char* words[] = {"never seen", "alive", "late", "lost", "corrupt"};
             double share[5] = {};

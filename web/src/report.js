@@ -61,8 +61,8 @@ function scorecard(shifts) {
         h("td", { class: `verdict ${m.verdict}` }, m.verdict))))))));
 }
 
-const limit = (value) => (value === null || value === undefined ? "" : `${value}`);
-const digits = (value) => (Math.abs(value) >= 100 ? 0 : Math.abs(value) >= 10 ? 1 : 3);
+function limit(value) { return value === null || value === undefined ? "" : `${value}`; }
+function digits(value) { return Math.abs(value) >= 100 ? 0 : Math.abs(value) >= 10 ? 1 : 3; }
 
 function drawPlots(parent, series) {
   const bands = data.shifts.flatMap((s) => (s.phases.length ? s.phases.map((p) => ({ from: p.from, to: p.to, label: p.name })) : [{ from: s.command_s, to: s.end_s, label: `${s.from}→${s.to}` }]));
@@ -125,9 +125,14 @@ function decode(series) {
   };
   const clean = (values) => Array.from(values, (v) => (Number.isFinite(v) ? v : null));
   const columns = new Map();
-  for (const column of series.columns) columns.set(column.name, { name: column.name, label: column.label ?? column.name, unit: column.unit, values: clean(floats(column.values)) });
+  for (const column of series.columns) columns.set(column.name, { name: column.name, label: short(column.name), unit: column.unit, values: clean(floats(column.values)) });
   const times = Uint8Array.from(atob(series.t), (c) => c.charCodeAt(0));
   return { t: Array.from(new Float64Array(times.buffer)), columns };
+}
+
+/** "clutch.F2.pressure" → "F2": what the title of its plot says already is left out. */
+function short(name) {
+  return name.replace(/^(mass|clutch|shaft|driver|bus|body)\./, "").replace(/\.(speed|slip|torque|pressure|pressure_command|temperature|status|acceleration)$/, "");
 }
 
 function nearest(times, t) {
