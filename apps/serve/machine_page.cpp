@@ -128,7 +128,7 @@ class Page {
                 options.push_back({{"value", position.lever},
                                    {"label", position.gear_path.empty() ? "N" : position.gear_path}});
             }
-            if (!neutral) options.insert(options.begin(), {{"value", 0}, {"label", "N"}});
+            if (!neutral) options.insert(options.begin(), json::object({{"value", 0}, {"label", "N"}}));
             list.push_back({{"signal", "driver.lever"},
                             {"label", "Lever"},
                             {"options", options},

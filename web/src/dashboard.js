@@ -70,7 +70,7 @@ function control(c) {
 }
 
 function faults(list) {
-  return panel("Faults", h("div", { class: "row" }, list.map((f) => {
+  return panel("Faults", h("div", { class: "faults" }, list.map((f) => {
     const button = h("button", { class: "fault", "aria-pressed": "false", "data-fault": f.name, onclick: async () => { const on = button.getAttribute("aria-pressed") !== "true"; if (await post("/api/fault", { name: f.name, active: on })) button.setAttribute("aria-pressed", String(on)); } }, f.label);
     return button;
   })));
