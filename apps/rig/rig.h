@@ -100,6 +100,7 @@ class Rig {
     void report_timing(std::int64_t overruns, double load) SHIFTRIG_REALTIME;
 
     Buses& buses() noexcept { return buses_; }
+    const Buses& buses() const noexcept { return buses_; }
 
     // Everything that a tick depends on and changes: saved and restored into a rig of the same set-up, the run goes on
     // as if nothing had happened, bit for bit.

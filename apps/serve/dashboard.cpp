@@ -37,6 +37,7 @@ Dashboard::Dashboard(rig::Rig& rig, DashboardOptions options) : rig_(rig), optio
         if (index >= 0 && judged_.size() < most_judged) judged_.push_back(index);
     }
     for (const int index : judged_) recent_.columns.push_back({table.signal(index), {}});
+    limp_ = table.find("controller.limp");
     recent_.machine = rig.model().description();
     factor_ = options_.loop.factor;
     http_ = std::make_unique<HttpServer>(
@@ -114,6 +115,8 @@ void Dashboard::take(const rig::Rig& rig, const rt::Tick& tick) SHIFTRIG_REALTIM
     filling_.time = time;
     filling_.ticks = rig.ticks();
     filling_.overruns = static_cast<std::int64_t>(rig.value(rig.own().overruns));
+    const tcu::Controller* built_in = rig.buses().built_in();
+    filling_.limp = built_in ? built_in->mode() == tcu::Mode::limp : limp_ >= 0 && rig.value(limp_) != 0;
     filling_.count = static_cast<std::uint32_t>(
         std::min<std::size_t>(most_signals, static_cast<std::size_t>(rig.signals().size())));
     for (std::uint32_t i = 0; i < filling_.count; ++i) filling_.value[i] = rig.value(static_cast<int>(i));
@@ -160,6 +163,8 @@ std::string Dashboard::sample_json(const Frame& frame) const {
     }
     if (frame.value[static_cast<std::size_t>(rig_.own().safe_command)] > 0)
         rest["banner"] = "The controller is silent: the safe command acts.";
+    else if (frame.limp)
+        rest["banner"] = "The controller is in its limp state.";
     text += "],\"health\":" + rest["health"].dump();
     if (rest.contains("banner")) text += ",\"banner\":" + rest["banner"].dump();
     return text + "}";

@@ -50,6 +50,7 @@ class Dashboard {
     struct Frame {
         double time = 0;
         std::int64_t ticks = 0, overruns = 0;
+        bool limp = false;  // the controller says so
         std::uint32_t count = 0;
         std::array<double, most_signals> value;
     };
@@ -88,6 +89,7 @@ class Dashboard {
     rt::Queue<Happening> happenings_{4096};
     Frame filling_;
     std::int64_t last_frame_ns_ = 0;
+    int limp_ = -1;  // signal, where the bus carries it
     std::vector<int> judged_;  // signals in a Row
     analysis::Run recent_;     // the last minute, for the scorecard
     double told_until_ = 0;    // end of the last shift told [s]

@@ -86,7 +86,9 @@ test("the dashboard follows the driver, shows a fault and gives the recording", 
 
   // A lost sensor: the controller goes to limp.
   await page.click("[data-fault='output.dropout']");
-  await until("limp", async () => /dropout/.test(await page.textContent("[aria-label='Events']")));
+  await until("the fault is an event", async () => /dropout/.test(await page.textContent("[aria-label='Events']")));
+  await until("limp is said", async () => /limp/.test(await page.textContent("[role=status]")));
+  if (pictures) await page.screenshot({ path: join(pictures, "dashboard-limp.png"), fullPage: true });
   await page.click("[data-fault='output.dropout']");
 
   // A parameter is changed while it runs, and the change is an event.
