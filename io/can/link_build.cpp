@@ -239,11 +239,8 @@ void CanLink::Data::build_received(const Mapping& mapping, const dbc::Message& l
             entry.use == Use::constant || entry.use == Use::direction || entry.use == Use::travelled;
         if (!no_way_back) message.fields.push_back(build_field(mapping, layout, entry, true, signals));
     }
-    const std::string status = "bus." + layout.name + ".status";
-    message.status_index = signals.find(status);
-    if (message.status_index < 0)
-        message.status_index =
-            signals.add({.name = status, .description = "0 never seen, 1 alive, 2 late, 3 lost, 4 corrupt"});
+    message.status_index =
+        own_signal(signals, "bus." + layout.name + ".status", "0 never seen, 1 alive, 2 late, 3 lost, 4 corrupt");
     received.push_back(std::move(message));
 }
 
