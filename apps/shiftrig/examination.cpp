@@ -169,6 +169,7 @@ Examination examine(const io::ModelFile& file) {
     try {
         Examination result;
         result.machine = file.description;
+        result.engine = io::build_model(file).engine();  // everything that can be wrong comes out here
         const plant::Structure structure = plant::build_structure(file.description);
         result.masses = structure.mass_names;
         for (const auto& pair : structure.pairs) result.devices.push_back(pair.name);
@@ -220,6 +221,7 @@ nlohmann::ordered_json as_json(const Examination& examination) {
                            {"loop", tie_up.loop}});
     modes["open"] = modes_as_json(examination, examination.open);
     return {{"name", examination.machine.name},
+            {"engine", examination.engine},
             {"masses", masses},
             {"distribution_matrix",
              {{"masses", examination.masses}, {"devices", examination.devices}, {"values", matrix}}},
@@ -231,7 +233,8 @@ nlohmann::ordered_json as_json(const Examination& examination) {
 }
 
 void print(std::ostream& out, const Examination& examination, bool with_shapes) {
-    out << examination.machine.name << "\n\n";
+    out << examination.machine.name << " (" << examination.machine.masses.size() << " masses, "
+        << examination.devices.size() << " devices, integrated by " << examination.engine << ")\n\n";
     print_masses(out, examination);
     print_distribution(out, examination);
     print_gears(out, examination);
