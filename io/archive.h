@@ -50,7 +50,8 @@ class Archive {
 
     template <class T>
     void member(T& value) {
-        static_assert(std::is_trivially_copyable_v<T>, "name the members of this class in an archive() of its own");
+        static_assert(std::is_trivially_copyable_v<T>,
+                      "name the members of this class in an archive() of its own");
         raw(&value, sizeof value);
     }
     // Vectors keep their length: they are sized when the object is built.
@@ -73,7 +74,9 @@ class Archive {
         std::memcpy(data, from_.data(), size);
         from_ = from_.subspan(size);
     }
-    [[noreturn]] static void misfit() { throw InputError("the snapshot was taken of another assembly: its parts do not fit"); }
+    [[noreturn]] static void misfit() {
+        throw InputError("the snapshot was taken of another assembly: its parts do not fit");
+    }
 
     std::vector<std::byte>* to_ = nullptr;
     std::span<const std::byte> from_;

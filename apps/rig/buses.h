@@ -35,6 +35,11 @@ class Buses {
     // What the rig has to say at `now_ns`; then the built-in controller takes its turn.
     void send(std::int64_t now_ns, const io::SignalTable& signals) SHIFTRIG_REALTIME;
 
+    // The built-in controller's calibration, if there is one.
+    void recalibrate(const tcu::Calibration& calibration) {
+        if (node_) node_->recalibrate(calibration);
+    }
+
     void archive(io::Archive& a) {
         if (wire_) wire_->archive(a);
         for (auto& each : buses_) each.archive(a);

@@ -85,16 +85,20 @@ Setup setup_of(const io::Manifest& snapshot) {
     for (std::string name; buses >> name;) setup.buses.names.push_back(name);
     setup.buses.lockstep = fact("pace") == "lockstep";
     setup.buses.calibration_path = fact("calibration");
-    if (!setup.buses.calibration_path.empty()) setup.buses.built_in = tcu::read_calibration(setup.buses.calibration_path);
+    if (!setup.buses.calibration_path.empty())
+        setup.buses.built_in = tcu::read_calibration(setup.buses.calibration_path);
     setup.resumes = true;
     return setup;
 }
 
-void resume(Rig& rig, const io::Manifest& snapshot) { io::Archive::restore(snapshot.assembly, rig); }
+void resume(Rig& rig, const io::Manifest& snapshot) {
+    io::Archive::restore(snapshot.assembly, rig);
+}
 
 analysis::Run history_of(const io::Manifest& snapshot) {
     analysis::Run run;
-    const std::string_view text(reinterpret_cast<const char*>(snapshot.history.data()), snapshot.history.size());
+    const std::string_view text(reinterpret_cast<const char*>(snapshot.history.data()),
+                                snapshot.history.size());
     std::size_t at = 0;
     while (at < text.size() && text[at] != '\n') {
         const std::size_t end = text.find('\n', at);

@@ -21,7 +21,8 @@ class SnapshotTaker {
     void offer(Rig& rig);  // after every tick
     bool taken() const noexcept { return tick_ >= 0; }
     // After the run. `run` gives the history that a judgement of a shift in progress needs. Throws RecordingError.
-    void write(const std::string& path, const Rig& rig, const rt::LoopSettings& loop, const analysis::Run& run) const;
+    void write(const std::string& path, const Rig& rig, const rt::LoopSettings& loop,
+               const analysis::Run& run) const;
 
   private:
     std::int64_t at_ns_;

@@ -92,5 +92,6 @@ struct Calibration {
 
 // Throws io::InputError naming file, line, key and rule.
 Calibration read_calibration(const std::string& path);
+Calibration parse_calibration(const std::string& text, const std::string& path);
 
 }  // namespace shiftrig::tcu

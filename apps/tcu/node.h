@@ -27,6 +27,9 @@ class Node {
     // As if the controller had been switched off and on again: it forgets everything.
     void restart() SHIFTRIG_REALTIME;
 
+    // Another calibration of the same machine and cycle, from the next cycle on.
+    void recalibrate(const Calibration& calibration) { calibration_ = calibration; }
+
     void archive(io::Archive& a) {
         controller_.archive(a);
         bus_.archive(a);
@@ -51,7 +54,7 @@ class Node {
     void say(const Sensors& sensors) noexcept;
     bool cycle_is_due(bool asked, std::int64_t now_ns) noexcept;
 
-    const Calibration calibration_;
+    Calibration calibration_;
     Controller controller_;
     io::SignalTable signals_;
     bus::Bus bus_;

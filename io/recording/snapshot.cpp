@@ -15,7 +15,8 @@ void write_snapshot(const std::string& path, const Manifest& manifest) {
 Manifest read_snapshot(const std::string& path) {
     RecordingReader reader(path);
     if (reader.manifest().assembly.empty())
-        throw RecordingError(path + ": is a recording, not a snapshot; `shiftrig run --snapshot-at T FILE` makes one");
+        throw RecordingError(
+            path + ": is a recording, not a snapshot; `shiftrig run --snapshot-at T FILE` makes one");
     RecordedTick tick;
     if (reader.next(tick) || reader.ending() != Ending::complete) throw RecordingError(reader.complaint());
     return reader.manifest();

@@ -1,0 +1,198 @@
+#include "apps/rig/fork.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "apps/rig/snapshot.h"
+#include "io/units.h"
+#include "io/yaml_document.h"
+
+namespace shiftrig::rig {
+
+namespace {
+
+// One thread's rig, brought back to the snapshot for every branch.
+class Brancher {
+  public:
+    Brancher(const io::Manifest& snapshot, const Plan& plan, const ForkOptions& options)
+        : snapshot_(snapshot),
+          plan_(plan),
+          setup_(setup_of(snapshot)),
+          limits_(analysis::default_limits()),
+          run_(history_of(snapshot)) {
+        if (!setup_.buses.built_in)
+            throw io::InputError(
+                "the snapshot's controller was not the built-in one: its state is not in the snapshot");
+        if (!setup_.buses.calibration_path.empty())
+            calibration_text_ = io::read_text(setup_.buses.calibration_path);
+        for (const auto& v : plan.variations()) rebuilds_ = rebuilds_ || v.target == Variation::Target::model;
+        for (const auto& v : plan.variations())
+            recalibrates_ = recalibrates_ || v.target == Variation::Target::calibration;
+        rig_ = std::make_unique<Rig>(setup_);
+        ticks_ = std::llround(options.duration * 1e9 / static_cast<double>(setup_.tick_ns));
+        for (const auto& v : plan.variations())
+            signals_.push_back(v.target == Variation::Target::signal ? find(v.name) : Settable{});
+
+        // The history's columns that the rig still has, with room for the branch.
+        run_.machine = setup_.model.description;
+        std::erase_if(run_.columns,
+                      [&](const analysis::Column& c) { return rig_->signals().find(c.signal.name) < 0; });
+        history_rows_ = run_.time.size();
+        for (auto& column : run_.columns) {
+            indices_.push_back(rig_->signals().find(column.signal.name));
+            column.signal = rig_->signals().signal(indices_.back());
+            column.value.resize(history_rows_ + static_cast<std::size_t>(ticks_));
+        }
+        run_.time.resize(history_rows_ + static_cast<std::size_t>(ticks_));
+    }
+
+    Branch run(std::int64_t number) {
+        Branch branch;
+        branch.number = number;
+        branch.values = plan_.values(number);
+        try {
+            prepare(branch.values);
+        } catch (const std::exception& error) {
+            branch.error = error.what();
+            rig_ = std::make_unique<Rig>(setup_);
+            return branch;
+        }
+        for (std::size_t row = history_rows_; row < run_.time.size(); ++row) {
+            rig_->tick();
+            run_.time[row] = rig_->sim_time();
+            for (std::size_t c = 0; c < indices_.size(); ++c)
+                run_.columns[c].value[row] = rig_->value(indices_[c]);
+        }
+        judge(branch);
+        return branch;
+    }
+
+  private:
+    struct Settable {
+        int signal = -1;
+        double factor = 1;
+    };
+
+    Settable find(const std::string& name) const {
+        const auto& table = rig_->signals();
+        if (const int signal = table.find(name); signal >= 0 && table.signal(signal).unit == plant::Unit::one)
+            return {signal, 1};
+        if (const auto* unit = io::unit_spelling(name)) {
+            const int signal = table.find(name.substr(0, name.size() - unit->suffix.size()));
+            if (signal >= 0 && unit->unit == table.signal(signal).unit) return {signal, unit->factor};
+        }
+        std::string near;
+        for (const auto& known : table.nearest(name)) near += (near.empty() ? "" : ", ") + known;
+        throw io::InputError("--vary " + name +
+                             ": no such signal, or without its unit's suffix; near: " + near);
+    }
+
+    void prepare(const std::vector<double>& values) {
+        const auto& variations = plan_.variations();
+        if (rebuilds_) {
+            YamlVariant model(snapshot_.model_text, snapshot_.model_path);
+            for (std::size_t i = 0; i < values.size(); ++i)
+                if (variations[i].target == Variation::Target::model)
+                    model.set(variations[i].name, values[i], variations[i].relative);
+            Setup setup = setup_;
+            setup.model = io::parse_model(model.text(), snapshot_.model_path);
+            for (const auto& [gear, option] : snapshot_.overrides)
+                io::select_option(setup.model.description, gear, option);
+            rig_ = std::make_unique<Rig>(std::move(setup));
+        }
+        resume(*rig_, snapshot_);
+        if (recalibrates_) {
+            YamlVariant calibration(calibration_text_, setup_.buses.calibration_path);
+            for (std::size_t i = 0; i < values.size(); ++i)
+                if (variations[i].target == Variation::Target::calibration)
+                    calibration.set(variations[i].name, values[i], variations[i].relative);
+            rig_->buses().recalibrate(
+                tcu::parse_calibration(calibration.text(), setup_.buses.calibration_path));
+        }
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            if (variations[i].target != Variation::Target::signal) continue;
+            const double wanted = variations[i].relative ? values[i] * rig_->value(signals_[i].signal)
+                                                         : values[i] * signals_[i].factor;
+            if (!rig_->request(signals_[i].signal, wanted))
+                throw io::InputError("--vary " + variations[i].name +
+                                     ": this signal is not the user's to set");
+        }
+    }
+
+    void judge(Branch& branch) const {
+        const analysis::Scorecard card = analysis::score(run_, limits_);
+        if (card.shifts.empty()) return;
+        const analysis::ShiftScore& score = card.shifts.back();
+        branch.shifted = true;
+        branch.completed = score.shift.completed();
+        branch.verdict = score.verdict;
+        branch.metrics = score.metrics;
+        int judged = 0;
+        for (const auto& metric : score.metrics) {
+            const analysis::Limit* limit = limits_.find(metric.name, score.shift.kind);
+            if (!metric.value || !limit || limit->reject == 0) continue;
+            branch.burden += *metric.value / limit->reject;
+            ++judged;
+        }
+        if (judged > 0) branch.burden /= judged;
+    }
+
+    const io::Manifest& snapshot_;
+    const Plan& plan_;
+    const Setup setup_;
+    const analysis::Limits limits_;
+    analysis::Run run_;
+    std::string calibration_text_;
+    bool rebuilds_ = false, recalibrates_ = false;
+    std::unique_ptr<Rig> rig_;
+    std::int64_t ticks_ = 0;
+    std::size_t history_rows_ = 0;
+    std::vector<Settable> signals_;  // by variation
+    std::vector<int> indices_;       // by column
+};
+
+bool better(const Branch& a, const Branch& b) {
+    if (a.completed != b.completed) return a.completed;
+    if (a.shifted != b.shifted) return a.shifted;
+    if (a.verdict != b.verdict) return a.verdict < b.verdict;
+    if (a.burden != b.burden) return a.burden < b.burden;
+    return a.number < b.number;
+}
+
+}  // namespace
+
+std::vector<Branch> fork(const io::Manifest& snapshot, const Plan& plan, const ForkOptions& options,
+                         std::atomic<std::int64_t>& done) {
+    std::vector<Branch> branches(static_cast<std::size_t>(plan.branches()));
+    std::atomic<std::int64_t> next{0};
+    std::mutex mutex;
+    std::exception_ptr failure;
+    const auto work = [&] {
+        try {
+            Brancher brancher(snapshot, plan, options);
+            for (std::int64_t n = next++; n < plan.branches(); n = next++) {
+                branches[static_cast<std::size_t>(n)] = brancher.run(n);
+                ++done;
+            }
+        } catch (...) {
+            const std::lock_guard lock(mutex);
+            if (!failure) failure = std::current_exception();
+            next = plan.branches();
+        }
+    };
+    const int threads = options.threads > 0
+                            ? options.threads
+                            : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    std::vector<std::thread> workers;
+    for (int i = 0; i < threads; ++i) workers.emplace_back(work);
+    for (auto& worker : workers) worker.join();
+    if (failure) std::rethrow_exception(failure);
+    std::sort(branches.begin(), branches.end(), better);
+    return branches;
+}
+
+}  // namespace shiftrig::rig
