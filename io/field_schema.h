@@ -2,6 +2,7 @@
 // check a model or scenario while it is being written.
 #pragma once
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -100,6 +101,9 @@ class FieldSchema {
             // What the alternative's list requires is required only together with it.
             json required = std::exchange(required_, json::array());
             alternative.list();
+            // What tells the alternatives apart has to be there, even a flag.
+            if (std::find(required_.begin(), required_.end(), alternative.key) == required_.end())
+                required_.push_back(alternative.key);
             group.push_back({{"required", std::exchange(required_, std::move(required))}});
         }
         alternatives_.push_back(std::move(group));
