@@ -22,10 +22,37 @@ void fail(const std::string& path, const YAML::Mark& mark, const std::string& wh
     throw InputError(path, mark.line + 1, mark.column + 1, what);
 }
 
+namespace {
+
+// An alias may name a node around it, or multiply into more nodes than any machine has.
+class AliasWatch {
+  public:
+    explicit AliasWatch(const std::string& path) : path_(path) {}
+
+    void walk(const YAML::Node& node) {
+        if (++count_ > most_nodes) fail(path_, node.Mark(), "aliases unfold into too much");
+        for (const auto& around : around_)
+            if (around.is(node)) fail(path_, node.Mark(), "an alias names the map or list it stands in");
+        if (!node.IsMap() && !node.IsSequence()) return;
+        around_.push_back(node);
+        for (const auto& item : node) walk(node.IsMap() ? item.second : item);
+        around_.pop_back();
+    }
+
+  private:
+    static constexpr int most_nodes = 1'000'000;
+    const std::string& path_;
+    std::vector<YAML::Node> around_;
+    int count_ = 0;
+};
+
+}  // namespace
+
 YAML::Node parse_yaml(const std::string& text, const std::string& path) {
     try {
         const YAML::Node root = YAML::Load(text);
         if (!root || root.IsNull()) throw InputError(path, 1, 1, "the file is empty");
+        AliasWatch(path).walk(root);
         return root;
     } catch (const YAML::Exception& error) {
         fail(path, error.mark, "not valid YAML: " + error.msg);

@@ -277,6 +277,19 @@ TEST(ModelFile, BrokenYamlIsNamedWithItsPlace) {
               "m.yaml:5:9: gear \"a.b\": a name is made of letters, digits and _");
 }
 
+TEST(ModelFile, AliasesThatNeverEndAreRefused) {
+    EXPECT_EQ(refusal("name: x\nmasses: &m\n  <<: *m\n"),
+              "m.yaml:2:9: an alias names the map or list it stands in");
+    std::string bomb = "name: x\ntemplates:\n  a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+    for (int i = 1; i < 9; ++i) {
+        const std::string last = "*a" + std::to_string(i - 1);
+        bomb += "  a" + std::to_string(i) + ": &a" + std::to_string(i) + " [" + last;
+        for (int k = 1; k < 10; ++k) bomb += ", " + last;
+        bomb += "]\n";
+    }
+    EXPECT_NE(refusal(bomb).find("aliases unfold into too much"), std::string::npos);
+}
+
 TEST(ModelFile, AMissingFileIsNamed) {
     try {
         read_model("nosuch.yaml");
