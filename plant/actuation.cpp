@@ -8,7 +8,7 @@ namespace shiftrig::plant::detail {
 namespace {
 
 double input(const Work& w, int index) noexcept {
-    return index < 0 ? 0 : w.scratch.input[static_cast<std::size_t>(index)];
+    return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)];
 }
 
 constexpr int hydraulic_slots = 7;  // HydraulicState in the State block, the delay line behind it
@@ -28,6 +28,17 @@ bool stuck_pair(const Work& w, const PairLaw& law, PairLoad& load) noexcept {
     load.fixed = fault > 0.5;
     if (load.fixed) load.values = constant(fault > 1.5 ? law.full_load : 0);
     return load.fixed;
+}
+
+bool changes(const PairLaw& law, const PairLoad& load) noexcept {
+    if (load.fixed) return false;
+    switch (law.source) {
+        case LoadSource::waveform: return true;
+        case LoadSource::hydraulic: return !load.hydraulic.rests();
+        case LoadSource::release:
+        case LoadSource::apply: return load.values.begin != load.values.end;
+        default: return false;
+    }
 }
 
 }  // namespace
@@ -50,6 +61,10 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
         const PairLaw& law = m.pair_laws[i];
         PairLoad& load = w.scratch.loads[i];
         load.scale = 1;
+        if (law.source >= LoadSource::rolling) {  // by nature, not by actuation
+            load.moves = load.fixed = false;
+            continue;
+        }
         switch (law.source) {
             case LoadSource::constant: load.values = constant(1); break;
             case LoadSource::input: load.values = constant(input(w, law.command)); break;
@@ -75,6 +90,8 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
             default: break;
         }
         stuck_pair(w, law, load);
+        load.moves = changes(law, load);
+        if (!load.moves) load.held = pair_load(w, k, {w.start, 0, Side::right});
     }
 }
 
@@ -86,6 +103,10 @@ void hold_actuation(Work& w) SHIFTRIG_REALTIME {
         const PairLaw& law = m.pair_laws[i];
         PairLoad& load = w.scratch.loads[i];
         load.scale = 1;
+        if (law.source >= LoadSource::rolling) {
+            load.moves = load.fixed = false;
+            continue;
+        }
         switch (law.source) {
             case LoadSource::constant: load.values = constant(1); break;
             case LoadSource::input: load.values = constant(input(w, law.command)); break;
@@ -101,6 +122,8 @@ void hold_actuation(Work& w) SHIFTRIG_REALTIME {
             default: break;
         }
         stuck_pair(w, law, load);
+        load.moves = law.source == LoadSource::waveform && !load.fixed;
+        if (!load.moves) load.held = pair_load(w, k, {w.start, 0, Side::right});
     }
 }
 
@@ -132,29 +155,15 @@ Instant instant_at(const Work& w, double fraction, Side side) noexcept {
     return {w.start + fraction * w.h, fraction, side};
 }
 
-bool has_moving_load(const Work& w, int pair) noexcept {
-    const auto i = static_cast<std::size_t>(pair);
-    const PairLoad& load = w.scratch.loads[i];
-    switch (w.model.pair_laws[i].source) {
-        case LoadSource::waveform: return !load.fixed;
-        case LoadSource::hydraulic:
-            return !load.fixed && !(load.hydraulic.valve.begin == load.hydraulic.valve.end &&
-                                    load.hydraulic.valve.begin == load.hydraulic.valve.middle);
-        case LoadSource::release:
-        case LoadSource::apply: return !load.fixed && load.values.begin != load.values.end;
-        default: return false;
-    }
-}
-
 }  // namespace
 
 bool is_pressed(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {
-    if (!has_moving_load(w, pair) || at.fraction >= 1) return false;
+    if (!w.scratch.loads[static_cast<std::size_t>(pair)].moves || at.fraction >= 1) return false;
     return pair_load(w, pair, instant_at(w, at.fraction + a_little, Side::left)) > 0;
 }
 
 double load_edge(const Work& w, int pair, double from, double until) SHIFTRIG_REALTIME {
-    if (!has_moving_load(w, pair)) return 1;
+    if (!w.scratch.loads[static_cast<std::size_t>(pair)].moves) return 1;
     double before = from + a_little, after = until - a_little;
     const bool pressed = pair_load(w, pair, instant_at(w, before, Side::left)) > 0;
     if ((pair_load(w, pair, instant_at(w, after, Side::left)) > 0) == pressed) return 1;

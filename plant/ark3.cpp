@@ -41,7 +41,7 @@ void middle_sample(Work& w, const Mode& mode) {
     const double h = end.at.time - begin.at.time;
     tree_sample_rate(w, mode, begin);
     tree_sample_rate(w, mode, end);
-    for (int i = 0; i < w.model.states_padded; ++i) {
+    for (int i = 0; i < w.model.states; ++i) {
         half.z[i] = 0.5 * (begin.z[i] + end.z[i]) + h / 8 * (begin.rate[i] - end.rate[i]);
     }
     for (int i = 0; i < w.model.auxiliary; ++i) {
@@ -73,7 +73,6 @@ void write_state(const ModelData& m, const TreeMode& t, const GroupState& s, dou
         const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
         if (edge.shaft >= 0) z[m.masses + edge.shaft] = edge.sign * t.ratio[p] * s.twist[g];
     }
-    std::fill(z + m.states, z + m.states_padded, 0.);
 }
 
 }  // namespace

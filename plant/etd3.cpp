@@ -20,33 +20,33 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     const double h = (end_fraction - begin.at.fraction) * w.h;
     StepOperators part = place_operators(m, s.operator_memory.data());
     if (!whole) build_step_operators(m, mode, h, part, s.workspace.data());
-    const StepOperators& op = whole ? mode.step : part;
+    const StepOperators& op = s.used = whole ? mode.step : part;
 
-    const int blocks = m.states_padded / panel_rows, n = m.states_padded;
+    const int rows = m.states_padded;
     const auto multiply = m.kernel.multiply;
     const double middle = 0.5 * (begin.at.fraction + end_fraction);
     half.at = {w.start + middle * w.h, middle, Side::right};
     late.at = end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
 
-    multiply(op.half, blocks, m.columns, begin.z, nullptr, half.z);
+    multiply(op.half, rows, m.columns, begin.z, nullptr, half.z);
     for (int i = 0; i < m.auxiliary; ++i) half.auxiliary[i] = begin.auxiliary[i] + 0.5 * h * begin.auxiliary_rate[i];
     evaluate_forces(w, w.contact, half);
 
     double* transported = s.vector_a.data();
     double* extrapolated = s.vector_b.data();
-    multiply(op.whole, blocks, n, begin.z, nullptr, transported);
+    multiply(op.whole, rows, m.states, begin.z, nullptr, transported);
     for (int k = 0; k < m.forces; ++k) extrapolated[k] = 2 * half.f[k] - begin.f[k];
-    multiply(op.first, blocks, m.forces, extrapolated, transported, late.z);
+    multiply(op.first, rows, m.forces, extrapolated, transported, late.z);
     for (int i = 0; i < m.auxiliary; ++i) {
         late.auxiliary[i] = begin.auxiliary[i] + h * (2 * half.auxiliary_rate[i] - begin.auxiliary_rate[i]);
     }
-    evaluate_forces(w, w.contact, late);
+    evaluate_forces(w, w.contact, late, Extent::moving_pairs);
 
     double* forces = s.vector_c.data();
     std::copy(begin.f, begin.f + m.forces, forces);
     std::copy(half.f, half.f + m.forces, forces + m.forces);
     std::copy(late.f, late.f + m.forces, forces + 2 * m.forces);
-    multiply(op.combined, blocks, 3 * m.forces, forces, transported, end.z);
+    multiply(op.combined, rows, 3 * m.forces, forces, transported, end.z);
     for (int i = 0; i < m.auxiliary; ++i) {
         end.auxiliary[i] = begin.auxiliary[i] + h / 6 * (begin.auxiliary_rate[i] + 4 * half.auxiliary_rate[i] +
                                                          late.auxiliary_rate[i]);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <utility>
 
 #include "plant/laws/sensor.h"
 #include "plant/ledger.h"
@@ -15,10 +17,24 @@ constexpr std::uint64_t noise_seed = 0x5ee0;  // sensors draw from their own str
 void load_sample(const ModelData& m, const double* block, double time, Sample& s) {
     std::copy(block + m.layout.speeds, block + m.layout.speeds + m.masses, s.z);
     std::copy(block + m.layout.twists, block + m.layout.twists + m.twists, s.z + m.masses);
-    std::fill(s.z + m.states, s.z + m.states_padded, 0.);
     std::copy(block + m.layout.auxiliary, block + m.layout.auxiliary + m.auxiliary, s.auxiliary);
     std::fill(s.torque, s.torque + m.torques, 0.);
     s.at = {time, 0, Side::right};
+}
+
+// Is the sample that the last step ended with the beginning of this one? Then its forces and torques are
+// what computing them again would give, bit for bit.
+bool is_carried(const ModelData& m, const OperatorsData& o, const double* block, const unsigned char* contact) {
+    if (!o.carried || m.depends_on_time) return false;
+    const Sample& s = o.samples[0];
+    const auto same = [](const void* a, const void* b, std::size_t bytes) { return std::memcmp(a, b, bytes) == 0; };
+    if (!same(s.z, block + m.layout.speeds, static_cast<std::size_t>(m.states) * sizeof(double))) return false;
+    if (!same(s.auxiliary, block + m.layout.auxiliary, static_cast<std::size_t>(m.auxiliary) * sizeof(double))) return false;
+    if (!same(o.carried_contact.data(), contact, o.carried_contact.size())) return false;
+    for (std::size_t e = 0; e < o.carried_modes.size(); ++e) {
+        if (o.carried_modes[e] != block[m.layout.engines + 3 * static_cast<int>(e)]) return false;
+    }
+    return true;
 }
 
 void reset(Outputs& outputs, ScratchData& scratch) {
@@ -29,7 +45,7 @@ void reset(Outputs& outputs, ScratchData& scratch) {
     scratch.begin_groups = nullptr;
 }
 
-double input(const Work& w, int index) { return index < 0 ? 0 : w.scratch.input[static_cast<std::size_t>(index)]; }
+double input(const Work& w, int index) { return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)]; }
 
 void advance_temperatures(Work& w) {
     const ModelData& m = w.model;
@@ -91,6 +107,21 @@ void advance_sensors(Work& w, const double* old_speeds) {
     }
 }
 
+// Calls with the kinematic column of every active row.
+template <typename Function>
+void for_rows(const ModelData& m, const Mode& mode, const Function& function) {
+    for (int r = 0; r < mode.row_count; ++r) {
+        const int unknown = mode.rows[r];
+        if (unknown < m.pairs) {
+            function(m.pair_slip[static_cast<std::size_t>(unknown)]);
+        } else if (unknown < m.pairs + m.meshes) {
+            function(m.mesh_slip[static_cast<std::size_t>(unknown - m.pairs)]);
+        } else {
+            function(m.mesh_motion[static_cast<std::size_t>(unknown - m.pairs - m.meshes)]);
+        }
+    }
+}
+
 // Residual of [Algin] eq. (15) at the sample: accelerations of the active rows from M̃ and M_R, term by term,
 // relative to the terms.
 double torque_residual(Work& w, const Mode& mode, const Sample& s) {
@@ -101,73 +132,56 @@ double torque_residual(Work& w, const Mode& mode, const Sample& s) {
     std::fill(size, size + m.masses, 0.);
     const auto take = [&](const auto& links, double moment) {
         for (const Link& link : links) {
-            if (link.mass < 0) continue;
-            torque[link.mass] -= link.factor * moment;
-            size[link.mass] += std::fabs(link.factor * moment);
+            const double part = link.factor * moment;
+            torque[link.mass] -= part;
+            size[link.mass] += std::fabs(part);
         }
     };
-    for (int k = 0; k < m.forces; ++k) take(m.force_columns[static_cast<std::size_t>(k)], s.f[k]);
-    for (int e = 0; e < m.twists; ++e) {
-        const Elastic& shaft = m.structure.shafts[static_cast<std::size_t>(e)];
-        take(shaft.links, shaft.stiffness * s.z[m.masses + e] + shaft.damping * slip_of(shaft.links, s.z));
+    for (int k = 0; k < m.forces; ++k) {
+        if (s.f[k] != 0) take(m.force_on[static_cast<std::size_t>(k)], s.f[k]);
     }
-    for (const Elastic& damper : m.structure.dampers) take(damper.links, damper.damping * slip_of(damper.links, s.z));
+    for (std::size_t e = 0; e < m.shaft_rate.size(); ++e) {
+        const Elastic& shaft = m.structure.shafts[e];
+        take(m.shaft_rate[e], shaft.stiffness * s.z[static_cast<std::size_t>(m.masses) + e] +
+                                  shaft.damping * slip_fast(m.shaft_rate[e], s.z));
+    }
+    for (std::size_t e = 0; e < m.damper_rate.size(); ++e) {
+        take(m.damper_rate[e], m.structure.dampers[e].damping * slip_fast(m.damper_rate[e], s.z));
+    }
     for (int r = 0; r < mode.row_count; ++r) {
         const int unknown = mode.rows[r];
         if (unknown < m.pairs) {
-            take(m.structure.pairs[static_cast<std::size_t>(unknown)].links, s.torque[unknown]);
+            take(m.pair_slip[static_cast<std::size_t>(unknown)], s.torque[unknown]);
         } else if (unknown < m.pairs + m.meshes) {
-            const int k = unknown - m.pairs;
-            const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
+            const auto k = static_cast<std::size_t>(unknown - m.pairs);
+            const Mesh& mesh = m.structure.meshes[k];
             const bool resting = mode.bound[unknown] || mode.key[unknown] == 0;
             const int x = resting ? 0 : mode.key[unknown] == 2 ? -1 : 1;
-            take(mesh.column(mesh.force_ratio(x)), s.torque[unknown]);
+            take(m.mesh_slip[k], s.torque[unknown]);
+            // û in place of u: the difference lies on the loss column.
+            take(m.mesh_loss[k], (1 - mesh.force_ratio(x) / mesh.ratio) * s.torque[unknown]);
         } else {
-            const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(unknown - m.pairs - m.meshes)];
-            take(std::array<Link, 2>{Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}}, s.torque[unknown]);
+            take(m.mesh_loss[static_cast<std::size_t>(unknown - m.pairs - m.meshes)], s.torque[unknown]);
         }
     }
+    const double* inertia = m.structure.inertia.data();
     double worst = 0;
     const auto examine = [&](const auto& links) {
         double sum = 0, terms = 0;
         for (const Link& link : links) {
-            if (link.mass < 0) continue;
-            const double inertia = m.structure.inertia[static_cast<std::size_t>(link.mass)];
-            sum += link.factor * torque[link.mass] / inertia;
-            terms += std::fabs(link.factor) * size[link.mass] / inertia;
+            const double mobility = link.factor / inertia[link.mass];
+            sum += mobility * torque[link.mass];
+            terms += std::fabs(mobility) * size[link.mass];
         }
-        if (terms > 0) worst = std::max(worst, std::fabs(sum) / terms);
+        if (std::fabs(sum) > worst * terms) worst = std::fabs(sum) / terms;
     };
-    for (int r = 0; r < mode.row_count; ++r) {
-        const int unknown = mode.rows[r];
-        if (unknown < m.pairs) examine(m.structure.pairs[static_cast<std::size_t>(unknown)].links);
-        else if (unknown < m.pairs + m.meshes) {
-            const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(unknown - m.pairs)];
-            examine(mesh.column(mesh.ratio));
-        } else examine(m.structure.meshes[static_cast<std::size_t>(unknown - m.pairs - m.meshes)].motion());
-    }
+    for_rows(m, mode, examine);
     return worst;
 }
 
 double constraint_violation(const Work& w, const Mode& mode, const double* speeds) {
-    const ModelData& m = w.model;
     double worst = 0;
-    for (int r = 0; r < mode.row_count; ++r) {
-        const int unknown = mode.rows[r];
-        double slip;
-        if (unknown < m.pairs) {
-            slip = slip_of(m.structure.pairs[static_cast<std::size_t>(unknown)].links, speeds);
-        } else if (unknown < m.pairs + m.meshes) {
-            const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(unknown - m.pairs)];
-            slip = 0;
-            for (const Link& link : mesh.column(mesh.ratio)) {
-                if (link.mass >= 0) slip += link.factor * speeds[link.mass];
-            }
-        } else {
-            slip = slip_of(m.structure.meshes[static_cast<std::size_t>(unknown - m.pairs - m.meshes)].motion(), speeds);
-        }
-        worst = std::max(worst, std::fabs(slip));
-    }
+    for_rows(w.model, mode, [&](const auto& links) { worst = std::max(worst, std::fabs(slip_fast(links, speeds))); });
     return worst;
 }
 
@@ -175,7 +189,7 @@ double constraint_violation(const Work& w, const Mode& mode, const double* speed
 void report_changes(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
     const double end = w.start + w.h;
-    const Sample& s = w.scratch.end;
+    const Sample& s = w.scratch.begin;
     for (int k = 0; k < m.meshes; ++k) {
         const unsigned char was = w.scratch.before[static_cast<std::size_t>(m.pairs + k)], is = w.contact[m.pairs + k];
         if (was == stuck || is == stuck || loss_exponent(was) == loss_exponent(is)) continue;
@@ -199,10 +213,28 @@ Work begin_step(const ModelData& m, OperatorsData& operators, State& state, Outp
     const double h = m.options.step_size;
     const double time = static_cast<double>(read_integer(block)) * h;
     reset(outputs, scratch);
-    load_sample(m, block, time, scratch.begin);
+    scratch.begin = operators.samples[0];
+    scratch.end = operators.samples[1];
+    if (is_carried(m, operators, block, contact)) {
+        scratch.begin.at = {time, 0, Side::right};
+    } else {
+        operators.carried = false;
+        load_sample(m, block, time, scratch.begin);
+    }
     std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
     outputs.certificate.mode_misses = -static_cast<std::int32_t>(operators.misses);
     return {m, operators, block, block, outputs, scratch, contact, time, h};
+}
+
+bool is_begun(const Work& w) SHIFTRIG_REALTIME {
+    if (!w.operators.carried) return false;
+    const Sample& s = w.scratch.begin;
+    for (int k = 0; k < w.model.pairs; ++k) {
+        if (w.model.pair_laws[static_cast<std::size_t>(k)].source >= LoadSource::rolling) continue;
+        const PairLoad& load = w.scratch.loads[static_cast<std::size_t>(k)];
+        if ((load.moves ? pair_load(w, k, s.at) : load.held) != s.load[k]) return false;
+    }
+    return true;
 }
 
 Work begin_look(const ModelData& m, OperatorsData& operators, const State& state, Outputs& outputs,
@@ -212,6 +244,9 @@ Work begin_look(const ModelData& m, OperatorsData& operators, const State& state
     const double h = m.options.step_size;
     const double time = static_cast<double>(read_integer(block)) * h;
     reset(outputs, scratch);
+    scratch.begin = operators.samples[0];
+    scratch.end = operators.samples[1];
+    operators.carried = false;
     load_sample(m, block, time, scratch.begin);
     std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
     outputs.certificate.mode_misses = -static_cast<std::int32_t>(operators.misses);
@@ -219,15 +254,8 @@ Work begin_look(const ModelData& m, OperatorsData& operators, const State& state
 }
 
 void accept(Work& w) SHIFTRIG_REALTIME {
-    const ModelData& m = w.model;
-    const Sample& end = w.scratch.end;
-    Sample& begin = w.scratch.begin;
-    std::copy(end.z, end.z + m.columns, begin.z);  // z and f
-    std::copy(end.auxiliary, end.auxiliary + m.auxiliary, begin.auxiliary);
-    std::copy(end.sliding, end.sliding + m.pairs, begin.sliding);
-    std::copy(end.holding, end.holding + m.pairs, begin.holding);
-    std::copy(end.torque, end.torque + m.torques, begin.torque);
-    begin.at = {end.at.time, end.at.fraction, Side::right};
+    std::swap(w.scratch.begin, w.scratch.end);
+    w.scratch.begin.at.side = Side::right;
     w.scratch.begin_groups = nullptr;
 }
 
@@ -237,6 +265,14 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const StateLayout& layout = m.layout;
     double* block = w.next;
     Certificate& certificate = w.outputs.certificate;
+
+    w.operators.samples[0] = s.begin;
+    w.operators.samples[1] = s.end;
+    w.operators.carried = true;
+    std::copy(w.contact, w.contact + m.contact_bytes, w.operators.carried_contact.begin());
+    for (std::size_t e = 0; e < m.engines.size(); ++e) {
+        w.operators.carried_modes[e] = block[layout.engines + 3 * static_cast<int>(e)];
+    }
 
     double* old_speeds = s.vector_c.data();
     std::copy(block + layout.speeds, block + layout.speeds + m.masses, old_speeds);
@@ -252,19 +288,18 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     block[layout.energy + 1] += s.dissipated;
 
     certificate.energy_defect = stored_energy(m, s.begin.z) - before - s.input_work + s.dissipated;
-    certificate.torque_residual = mode.tree ? s.torque_residual : torque_residual(w, mode, s.end);
+    certificate.torque_residual = mode.tree ? s.torque_residual : torque_residual(w, mode, s.begin);
     certificate.constraint_violation = constraint_violation(w, mode, s.begin.z);
     certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     double sum = 0;
     for (int i = 0; i < m.states; ++i) sum += s.begin.z[i];
     if (!std::isfinite(sum)) certificate.flags |= 4;
     report_changes(w, mode);
-    fill_outputs(w, mode, s.end);
+    fill_outputs(w, mode, s.begin);
 }
 
 void finish_look(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     Sample& s = w.scratch.begin;
-    sample_rate(w, mode, s);
     w.outputs.certificate.constraint_violation = constraint_violation(w, mode, s.z);
     w.outputs.certificate.torque_residual = torque_residual(w, mode, s);
     w.outputs.certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);

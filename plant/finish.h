@@ -9,6 +9,9 @@ namespace shiftrig::plant::detail {
 Work begin_step(const ModelData& model, OperatorsData& operators, State& state, Outputs& outputs,
                 ScratchData& scratch) SHIFTRIG_REALTIME;
 
+// True if the sample at the beginning already has its forces and torques, from the end of the last step.
+bool is_begun(const Work& work) SHIFTRIG_REALTIME;
+
 // The end of the part just computed becomes the beginning of the next.
 void accept(Work& work) SHIFTRIG_REALTIME;
 

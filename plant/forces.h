@@ -56,5 +56,13 @@ inline double slip_of(const std::array<Link, 2>& links, const double* speeds) no
     if (links[1].mass >= 0) slip += links[1].factor * speeds[links[1].mass];
     return slip;
 }
+// The same for ModelData's links, which have the housing as a mass of factor 0.
+inline double slip_fast(const std::array<Link, 2>& links, const double* speeds) noexcept {
+    return links[0].factor * speeds[links[0].mass] + links[1].factor * speeds[links[1].mass];
+}
+inline double slip_fast(const std::array<Link, 3>& links, const double* speeds) noexcept {
+    return links[0].factor * speeds[links[0].mass] + links[1].factor * speeds[links[1].mass] +
+           links[2].factor * speeds[links[2].mass];
+}
 
 }  // namespace shiftrig::plant::detail

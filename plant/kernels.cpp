@@ -1,34 +1,44 @@
 #include "plant/kernels.h"
 
 namespace shiftrig::plant::detail {
+namespace {
 
-void multiply_portable(const double* panel, int blocks, int columns, const double* v, const double* y0,
-                       double* y) SHIFTRIG_REALTIME {
-    for (int b = 0; b < blocks; ++b) {
-        const double* p = panel + static_cast<long>(b) * columns * panel_rows;
-        double sum[4][panel_rows] = {};
-        int c = 0;
-        for (; c + 4 <= columns; c += 4) {
-            for (int way = 0; way < 4; ++way) {
-                for (int r = 0; r < panel_rows; ++r) sum[way][r] += p[(c + way) * panel_rows + r] * v[c + way];
-            }
-        }
-        for (int way = 0; c < columns; ++c, ++way) {
-            for (int r = 0; r < panel_rows; ++r) sum[way][r] += p[c * panel_rows + r] * v[c];
-        }
-        for (int r = 0; r < panel_rows; ++r) {
-            const double total = (sum[0][r] + sum[1][r]) + (sum[2][r] + sum[3][r]);
-            y[b * panel_rows + r] = y0 ? y0[b * panel_rows + r] + total : total;
+template <int height>
+void multiply_panel(const double* p, int columns, const double* v, const double* y0, double* y) {
+    double sum[4][height] = {};
+    int c = 0;
+    for (; c + 4 <= columns; c += 4) {
+        for (int way = 0; way < 4; ++way) {
+            for (int r = 0; r < height; ++r) sum[way][r] += p[(c + way) * height + r] * v[c + way];
         }
     }
+    for (int way = 0; c < columns; ++c, ++way) {
+        for (int r = 0; r < height; ++r) sum[way][r] += p[c * height + r] * v[c];
+    }
+    for (int r = 0; r < height; ++r) {
+        const double total = (sum[0][r] + sum[1][r]) + (sum[2][r] + sum[3][r]);
+        y[r] = y0 ? y0[r] + total : total;
+    }
+}
+
+}  // namespace
+
+void multiply_portable(const double* panel, int rows, int columns, const double* v, const double* y0,
+                       double* y) SHIFTRIG_REALTIME {
+    int r = 0;
+    for (; r + panel_rows <= rows; r += panel_rows) {
+        multiply_panel<panel_rows>(panel + r * columns, columns, v, y0 ? y0 + r : nullptr, y + r);
+    }
+    if (r < rows) multiply_panel<4>(panel + r * columns, columns, v, y0 ? y0 + r : nullptr, y + r);
 }
 
 void to_panels(const double* matrix, int rows, int columns, double* panel) SHIFTRIG_REALTIME {
     const int stride = padded(rows);
-    for (int b = 0; b < stride / panel_rows; ++b) {
+    for (int first = 0; first < stride; first += panel_rows) {
+        const int height = stride - first < panel_rows ? stride - first : panel_rows;
         for (int c = 0; c < columns; ++c) {
-            const double* from = matrix + c * stride + b * panel_rows;
-            for (int r = 0; r < panel_rows; ++r) *panel++ = from[r];
+            const double* from = matrix + c * stride + first;
+            for (int r = 0; r < height; ++r) *panel++ = from[r];
         }
     }
 }
@@ -37,7 +47,7 @@ Kernel choose_kernel(KernelKind kind) {
     const Kernel portable{KernelKind::portable, "portable", multiply_portable};
 #if defined(SHIFTRIG_X86_KERNELS)
     const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-    const bool avx512 = __builtin_cpu_supports("avx512f");
+    const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl");
     if (avx512 && (kind == KernelKind::avx512 || kind == KernelKind::automatic)) {
         return {KernelKind::avx512, "avx512", multiply_avx512};
     }

@@ -1,9 +1,7 @@
-// The one inner loop of a step: a tall product y = y0 + P v with P stored in panels of eight rows, so that
-// a row block is a vector register (AVX-512) or two (AVX2). Which implementation runs is chosen when a
+// The one inner loop of a step: a tall product y = y0 + P v with P stored in panels of eight rows (the last one
+// of four, if that is enough), so that a panel is a vector register (AVX-512) or two (AVX2). Which implementation runs is chosen when a
 // model is built; all sum in the same order, but those with fused multiply-add round once where the
 // portable one rounds twice, so bits depend on the kernel.
-//
-//   panel(r, c) = P[(r / 8 · columns + c) · 8 + r % 8]
 //
 // Columns are dealt to four running sums by c % 4, added at the end as (s0 + s1) + (s2 + s3).
 #pragma once
@@ -13,12 +11,19 @@
 namespace shiftrig::plant::detail {
 
 constexpr int panel_rows = 8;
-constexpr int padded(int rows) noexcept { return (rows + panel_rows - 1) / panel_rows * panel_rows; }
+constexpr int padded(int rows) noexcept { return (rows + 3) / 4 * 4; }
 // Doubles that a panel takes.
 constexpr int panel_size(int rows, int columns) noexcept { return padded(rows) * columns; }
 
-// y[0 … 8·blocks) = y0 + P v, with y0 = 0 where `y0` is null. y may be y0, but must not be v.
-using Multiply = void (*)(const double* panel, int blocks, int columns, const double* v, const double* y0,
+// Where element (r, c) of a matrix of `rows` (padded) rows stands.
+constexpr int panel_index(int rows, int columns, int r, int c) noexcept {
+    const int first = r / panel_rows * panel_rows;
+    const int height = rows - first < panel_rows ? rows - first : panel_rows;
+    return first * columns + c * height + (r - first);
+}
+
+// y[0 … rows) = y0 + P v, rows a multiple of four; y0 = 0 where null. y may be y0, but must not overlap v.
+using Multiply = void (*)(const double* panel, int rows, int columns, const double* v, const double* y0,
                           double* y) SHIFTRIG_REALTIME;
 
 struct Kernel {

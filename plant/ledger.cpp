@@ -13,15 +13,14 @@ double field_and_mesh_losses(const Work& w, const Mode& mode, const Sample& s) {
     const ModelData& m = w.model;
     double power = s.field_power;
     for (int k = 0; k < m.meshes; ++k) {
-        const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
+        const auto i = static_cast<std::size_t>(k);
+        const Mesh& mesh = m.structure.meshes[i];
         const unsigned char state = w.contact[m.pairs + k];
         if (!mesh.lossy() || state == stuck || mode.bound[m.pairs + k]) continue;
         // M₁ (ω_1 − û ω_2 − (1 − û) ω_c), of which u in place of û gives nothing.
-        const double carrier = mesh.carrier < 0 ? 0 : s.z[mesh.carrier];
-        const double turning = s.z[mesh.second] - carrier;
-        const double lost_ratio = mesh.ratio - mesh.force_ratio(loss_exponent(state));
-        power += s.torque[m.pairs + k] * lost_ratio * turning;
-        const int bearing = m.bearing_force[static_cast<std::size_t>(k)];
+        const double turning = slip_fast(m.mesh_loss[i], s.z) / mesh.ratio;
+        power += s.torque[m.pairs + k] * (mesh.ratio - mesh.force_ratio(loss_exponent(state))) * turning;
+        const int bearing = m.bearing_force[i];
         if (bearing >= 0) power += s.f[bearing] * mesh.ratio * turning;
     }
     return power;
@@ -29,34 +28,33 @@ double field_and_mesh_losses(const Work& w, const Mode& mode, const Sample& s) {
 
 // Loss in dampers and in the damping of shafts [W].
 double damping_losses(const Work& w, const Sample& s) {
+    const ModelData& m = w.model;
     double power = 0;
-    const auto damped = [&](const Elastic& e) {
-        if (e.damping == 0) return;
-        const double rate = slip_of(e.links, s.z);
-        power += e.damping * rate * rate;
+    const auto damped = [&](double damping, const std::array<Link, 2>& links) {
+        const double rate = slip_fast(links, s.z);
+        power += damping * rate * rate;
     };
-    for (const Elastic& shaft : w.model.structure.shafts) damped(shaft);
-    for (const Elastic& damper : w.model.structure.dampers) damped(damper);
+    for (std::size_t e = 0; e < m.shaft_rate.size(); ++e) damped(m.structure.shafts[e].damping, m.shaft_rate[e]);
+    for (std::size_t e = 0; e < m.damper_rate.size(); ++e) damped(m.structure.dampers[e].damping, m.damper_rate[e]);
     return power;
 }
 
-// The state half way from Hermite's cubic, with its forces and internal torques; returns the energy lost by
-// damping [J].
+// The state half way, by the step's own weights with the force linear over its first half, with forces and
+// internal torques; returns the energy lost by damping [J].
 double fill_middle(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
-    Sample &begin = w.scratch.begin, &middle = w.scratch.middle, &end = w.scratch.end;
+    ScratchData& s = w.scratch;
+    Sample &begin = s.begin, &middle = s.middle, &end = s.end;
     const double h = end.at.time - begin.at.time;
-    sample_rate(w, mode, begin);
-    sample_rate(w, mode, end);
-    for (int i = 0; i < m.states_padded; ++i) {
-        middle.z[i] = 0.5 * (begin.z[i] + end.z[i]) + h / 8 * (begin.rate[i] - end.rate[i]);
-    }
+    double* change = s.vector_b.data();
+    for (int k = 0; k < m.forces; ++k) change[k] = s.half.f[k] - begin.f[k];
+    m.kernel.multiply(s.used.middle, m.states_padded, m.forces, change, s.half.z, middle.z);
     for (int i = 0; i < m.auxiliary; ++i) {
         middle.auxiliary[i] = 0.5 * (begin.auxiliary[i] + end.auxiliary[i]) +
                               h / 8 * (begin.auxiliary_rate[i] - end.auxiliary_rate[i]);
     }
-    middle.at = w.scratch.half.at;
-    evaluate_forces(w, w.contact, middle);
+    middle.at = s.half.at;
+    evaluate_forces(w, w.contact, middle, Extent::moving_pairs);
     internal_torques(w, mode, middle);
     return h / 6 * (damping_losses(w, begin) + 4 * damping_losses(w, middle) + damping_losses(w, end));
 }
@@ -83,9 +81,10 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const auto simpson = [h](double a, double b, double c) { return h / 6 * (a + 4 * b + c); };
     for (int k = 0; k < m.pairs; ++k) {
         if (w.contact[k] == locked) continue;
-        const auto& links = m.structure.pairs[static_cast<std::size_t>(k)].links;
-        const double heat = simpson(begin.f[k] * slip_of(links, begin.z),
-                                    middle.f[k] * slip_of(links, middle.z), end.f[k] * slip_of(links, end.z));
+        if (begin.f[k] == 0 && middle.f[k] == 0 && end.f[k] == 0) continue;
+        const auto& links = m.pair_slip[static_cast<std::size_t>(k)];
+        const double heat = simpson(begin.f[k] * slip_fast(links, begin.z), middle.f[k] * slip_fast(links, middle.z),
+                                    end.f[k] * slip_fast(links, end.z));
         w.scratch.heat[static_cast<std::size_t>(k)] += heat;
         w.scratch.dissipated += heat;
     }

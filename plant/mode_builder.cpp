@@ -69,7 +69,7 @@ ModeSizes::ModeSizes(const ModelData& m) {
     mobility = panel_size(m.masses, m.masses);
     rates = panel_size(m.states, m.columns);
     torques = panel_size(m.torques, m.columns);
-    operators = panel_size(m.states, m.columns + m.states_padded + 4 * m.forces);
+    operators = panel_size(m.states, m.columns + m.states + 5 * m.forces);
     key = (m.contact_bytes + 7) / 8 * 8;
 }
 
@@ -77,8 +77,9 @@ StepOperators place_operators(const ModelData& m, double* memory) noexcept {
     StepOperators o;
     o.half = memory;
     o.whole = o.half + panel_size(m.states, m.columns);
-    o.first = o.whole + panel_size(m.states, m.states_padded);
+    o.first = o.whole + panel_size(m.states, m.states);
     o.combined = o.first + panel_size(m.states, m.forces);
+    o.middle = o.combined + panel_size(m.states, 3 * m.forces);
     return o;
 }
 
@@ -285,7 +286,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int*) SHIFTRI
     }
     for (int k = 0; k < m.forces; ++k) {
         apply(m.force_columns[static_cast<std::size_t>(k)]);
-        add_to(states + k, 1);
+        add_to(m.states + k, 1);
     }
     to_panels(motion, m.states, m.columns, mode.rates);
     to_panels(torque, rows, m.columns, mode.torques);

@@ -122,6 +122,8 @@ void build_laws(ModelData& m) {
             case PairKind::engine_friction: law.source = LoadSource::engine; break;
         }
         if (law.heat) law.temperature = 2 * heated++;
+        law.sliding_at_rest = sliding_factor(law.friction, 0);
+        if (law.source == LoadSource::waveform) m.depends_on_time = true;
         m.pair_laws.push_back(law);
     }
     m.layout.actuators = actuator_slots;  // sizes for now, offsets in build_layout
@@ -150,6 +152,7 @@ void build_laws(ModelData& m) {
         SourceLaw law{s.mass(source.mass), -1};
         if (source.input) law.input = add_input(m, "source." + source.name + ".torque", Unit::newton_metre, 0, -1e9, 1e9, "test-bench torque");
         add_breakpoints(m, source.waveform);
+        if (!source.waveform.pieces.empty()) m.depends_on_time = true;
         m.sources.push_back(law);
     }
     for (const Road& road : d.roads) {
@@ -193,12 +196,28 @@ void build_sizes(ModelData& m) {
         if (m.description.masses[static_cast<std::size_t>(j)].motion == Motion::translating) m.translating.push_back(j);
     }
 
+    const auto branchless = [](auto links) {
+        for (Link& link : links) {
+            if (link.mass < 0) link = {0, 0};
+        }
+        return links;
+    };
+    for (const FrictionPair& pair : s.pairs) m.pair_slip.push_back(branchless(pair.links));
+    for (const Mesh& mesh : s.meshes) m.mesh_motion.push_back(branchless(mesh.motion()));
+    for (const Mesh& mesh : s.meshes) m.mesh_slip.push_back(branchless(mesh.column(mesh.ratio)));
+    for (const Mesh& mesh : s.meshes) {
+        m.mesh_loss.push_back(branchless(std::array<Link, 2>{Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}}));
+    }
+    for (const Elastic& shaft : s.shafts) m.shaft_rate.push_back(branchless(shaft.links));
+    for (const Elastic& damper : s.dampers) m.damper_rate.push_back(branchless(damper.links));
+
     for (const FrictionPair& pair : s.pairs) m.force_columns.push_back(pair.links);
     for (const Mesh& mesh : s.meshes) {
         const bool bearing = mesh.forward_bearing > 0 || mesh.backward_bearing > 0;
         m.bearing_force.push_back(bearing ? static_cast<int>(m.force_columns.size()) : -1);
         if (bearing) m.force_columns.push_back({Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}});
     }
+    m.first_external = static_cast<int>(m.force_columns.size());
     m.external_force.assign(static_cast<std::size_t>(m.masses), -1);
     const auto external = [&](int mass) {
         int& index = m.external_force[static_cast<std::size_t>(mass)];
@@ -218,7 +237,8 @@ void build_sizes(ModelData& m) {
     for (const SourceLaw& source : m.sources) external(source.mass);
     for (int body : m.road_mass) external(body);
     m.forces = static_cast<int>(m.force_columns.size());
-    m.columns = m.states_padded + m.forces;
+    for (const auto& links : m.force_columns) m.force_on.push_back(branchless(links));
+    m.columns = m.states + m.forces;
 }
 
 // Beyond about 40 speeds and twists a step along the tree is cheaper than dense products.

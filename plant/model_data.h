@@ -26,6 +26,7 @@ struct PairLaw {
     FrictionLaw friction;
     double drag = 0;           // of the open clutch, per viscosity and slip [m³]
     double full_load = 0;      // load at full engagement, for a pair stuck closed [Nm]
+    double sliding_at_rest = 0;  // friction factor at no slip [1]
     const Waveform* profile = nullptr;
     const ActuationHydraulic* hydraulic = nullptr;
     LagOperator lag;
@@ -69,15 +70,20 @@ struct ModelData {
     Structure structure;
     Kernel kernel;
 
-    // z = [ω; φ], padded to whole panels; f = [pairs; bearing friction of meshes; external torques].
+    // z = [ω; φ]; f = [pairs; bearing friction of meshes; external torques].
     int masses = 0, twists = 0, pairs = 0, meshes = 0;
     int states = 0, states_padded = 0;
     int forces = 0;                       // m
-    int columns = 0;                      // states_padded + m, what an operator multiplies
+    int first_external = 0;               // where bearing friction ends in f
+    int columns = 0;                      // states + m, what an operator multiplies
     int torques = 0;                      // unknowns: pairs, meshes, losses of stuck meshes
     int auxiliary = 0;                    // tyre slips, engine torque and boost
     int contact_bytes = 0;                // pairs + meshes
     std::vector<std::array<Link, 2>> force_columns;  // how f_k acts *out of* the masses (SDM sign)
+    // Slips and twist rates for the step: the housing is there mass 0 with factor 0, which needs no branch.
+    std::vector<std::array<Link, 2>> pair_slip, mesh_motion, mesh_loss, shaft_rate, damper_rate, force_on;
+    std::vector<std::array<Link, 3>> mesh_slip;
+    bool depends_on_time = false;         // waveforms: forces are no function of state and inputs alone
     std::vector<int> bearing_force;       // per mesh, −1: none
     std::vector<int> external_force;      // per mass, −1: none
     std::vector<double> root_inertia;     // √J

@@ -17,15 +17,6 @@
 
 namespace shiftrig::plant::detail {
 
-// Operators of the three-stage exponential step over one length of time (etd3.cpp).
-struct StepOperators {
-    double length = 0;           // [s]
-    double* half = nullptr;      // [P_h Q_h]            panels, states × columns
-    double* whole = nullptr;     // P                    panels, states × states
-    double* first = nullptr;     // Q_1                  panels, states × forces
-    double* combined = nullptr;  // Q1−3Q2+4Q3, 4Q2−8Q3, 4Q3−Q2   panels, states × 3 forces
-};
-
 // Bits of Mode::bound: why a pair does not slip, a mesh does not move.
 enum Bound : unsigned char {
     by_active_set = 1,   // others of the active set hold it at zero: it cannot change its state by itself
@@ -85,6 +76,20 @@ struct OperatorsData {
     std::uint64_t clock = 0;
     Mode* recent = nullptr;
     std::vector<unsigned char> wanted;  // key being looked up
+    // Inputs as they act and what follows from them alone; kept as long as the inputs are the same bits.
+    std::vector<double> raw_input, input;
+    std::vector<TyreSoil> soils;
+    std::vector<EngineInput> engine_inputs;
+    bool inputs_known = false;
+    // The samples a step begins and ends with. The end of one is the beginning of the next: carried over where
+    // State and inputs prove to be those it was computed from.
+    std::vector<double> sample_memory;
+    Sample samples[2];
+    int begin_sample = 0;
+    bool carried = false;
+    std::vector<unsigned char> carried_contact;
+    std::vector<double> carried_modes;  // of the engines
+
     // Hydraulic operators by oil temperature, a pure function of it and h.
     double oil_temperature = 0;
     bool oil_known = false;

@@ -30,6 +30,14 @@ OperatorsData::OperatorsData(const ModelData& m) {
         modes[i].rows = row_memory.data() + i * rows;
     }
     wanted.assign(key_bytes, 0);
+    raw_input.assign(m.inputs.size(), 0.);
+    input.assign(m.inputs.size(), 0.);
+    soils.resize(m.tyres.size());
+    engine_inputs.resize(m.engines.size());
+    sample_memory.assign(2 * sample_size(m), 0.);
+    for (std::size_t i = 0; i < 2; ++i) place_sample(m, samples[i], sample_memory.data() + i * sample_size(m));
+    carried_contact.assign(static_cast<std::size_t>(m.contact_bytes), 0);
+    carried_modes.assign(m.engines.size(), 0.);
     hydraulics.resize(static_cast<std::size_t>(m.pairs));
 }
 
@@ -118,7 +126,7 @@ Operators::Operators(Operators&&) noexcept = default;
 void Operators::drop() noexcept {
     for (detail::Mode& mode : data_->modes) mode.last_use = 0;
     data_->recent = nullptr;
-    data_->oil_known = false;
+    data_->oil_known = data_->inputs_known = data_->carried = false;
 }
 
 }  // namespace shiftrig::plant

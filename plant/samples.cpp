@@ -2,44 +2,42 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "plant/modes.h"
 
 namespace shiftrig::plant {
 namespace detail {
-namespace {
 
 std::size_t sample_size(const ModelData& m) {
-    return static_cast<std::size_t>(m.columns + 2 * m.auxiliary + 2 * m.pairs + m.torques + m.states_padded) +
-           2 * m.tyres.size() + 2 * m.converters.size() + m.engines.size() + 16;
+    return static_cast<std::size_t>(m.columns + 4 + 2 * m.auxiliary + 3 * m.pairs + m.torques + m.states_padded) +
+           2 * m.tyres.size() + 2 * m.converters.size() + m.engines.size();
 }
 
-void place(const ModelData& m, Sample& s, double* memory) {
-    s.z = memory;
-    s.f = s.z + m.states_padded;
-    s.auxiliary = s.z + m.columns;
-    s.auxiliary_rate = s.auxiliary + m.auxiliary;
-    s.sliding = s.auxiliary_rate + m.auxiliary;
-    s.holding = s.sliding + m.pairs;
-    s.torque = s.holding + m.pairs;
-    s.rate = s.torque + m.torques;
-    s.tyre_force = s.rate + m.states_padded;
-    s.tyre_slip = s.tyre_force + m.tyres.size();
-    s.converter = s.tyre_slip + m.tyres.size();
-    s.engine_torque = s.converter + 2 * m.converters.size();
+void place_sample(const ModelData& m, Sample& s, double* memory) {
+    const auto take = [&memory](std::size_t doubles) { return std::exchange(memory, memory + doubles); };
+    const auto pairs = static_cast<std::size_t>(m.pairs), auxiliary = static_cast<std::size_t>(m.auxiliary);
+    s.z = take(static_cast<std::size_t>(m.columns + 4));  // padding of products reaches beyond f in tiny models
+    s.f = s.z + m.states;
+    s.auxiliary = take(auxiliary);
+    s.auxiliary_rate = take(auxiliary);
+    s.load = take(pairs);
+    s.sliding = take(pairs);
+    s.holding = take(pairs);
+    s.torque = take(static_cast<std::size_t>(m.torques));
+    s.rate = take(static_cast<std::size_t>(m.states_padded));
+    s.tyre_force = take(m.tyres.size());
+    s.tyre_slip = take(m.tyres.size());
+    s.converter = take(2 * m.converters.size());
+    s.engine_torque = take(m.engines.size());
 }
-
-}  // namespace
 
 ScratchData::ScratchData(const ModelData& m) {
     const std::size_t size = sample_size(m);
-    Sample* const samples[] = {&begin, &half, &late, &end, &middle};
+    Sample* const samples[] = {&half, &late, &middle};
     buffer.assign(size * std::size(samples), 0.);
-    for (std::size_t i = 0; i < std::size(samples); ++i) place(m, *samples[i], buffer.data() + i * size);
-    input.assign(m.inputs.size(), 0.);
+    for (std::size_t i = 0; i < std::size(samples); ++i) place_sample(m, *samples[i], buffer.data() + i * size);
     loads.resize(static_cast<std::size_t>(m.pairs));
-    soils.resize(m.tyres.size());
-    engine_inputs.resize(m.engines.size());
     const auto bytes = static_cast<std::size_t>(m.contact_bytes);
     for (auto* list : {&before, &trial, &changed, &violations}) list->assign(bytes, 0);
     family.assign(bytes, 0);
@@ -62,7 +60,7 @@ Scratch::Scratch(Scratch&&) noexcept = default;
 void Scratch::fill_with_nan() noexcept {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     detail::ScratchData& s = *data_;
-    for (auto* numbers : {&s.buffer, &s.input, &s.vector_a, &s.vector_b, &s.vector_c, &s.torque_copy, &s.heat,
+    for (auto* numbers : {&s.buffer, &s.vector_a, &s.vector_b, &s.vector_c, &s.torque_copy, &s.heat,
                           &s.workspace, &s.operator_memory}) {
         std::fill(numbers->begin(), numbers->end(), nan);
     }
@@ -70,7 +68,7 @@ void Scratch::fill_with_nan() noexcept {
         load.values = {nan, nan, nan};
         load.hydraulic.valve = {nan, nan, nan};
         load.hydraulic.filled_from = load.hydraulic.spring_begin = load.hydraulic.spring_end = nan;
-        load.scale = nan;
+        load.scale = load.held = nan;
     }
     s.dissipated = s.input_work = nan;
 }

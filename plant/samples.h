@@ -21,10 +21,12 @@ struct Instant {
 
 struct Sample {
     Instant at;
-    double* z = nullptr;         // [ω; φ; padding], followed without a gap by
-    double* f = nullptr;         // forces: what an operator multiplies is z and f in one
+    double* z = nullptr;         // [ω; φ], followed without a gap by
+    double* f = nullptr;         // forces, in one with z for an operator to multiply; products that give z come
+                                 // before f is filled, since their padding reaches into it
     double* auxiliary = nullptr;
     double* auxiliary_rate = nullptr;
+    double* load = nullptr;      // per pair: what presses it together [Nm]
     double* sliding = nullptr;   // per pair: sliding capacity at its slip [Nm]
     double* holding = nullptr;   // per pair: static capacity [Nm]
     double* torque = nullptr;    // M of pairs, meshes, then loss torques of stuck meshes [Nm]
@@ -43,6 +45,22 @@ struct PairLoad {
     HydraulicStep hydraulic;
     double scale = 1;         // leak: share of the chamber pressure that is left
     bool fixed = false;       // stuck: `values` is the load
+    bool moves = true;        // changes within the step; otherwise it is `held` all the time
+    double held = 0;          // [Nm]
+};
+
+// Doubles of one sample, and its place in memory.
+std::size_t sample_size(const ModelData& model);
+void place_sample(const ModelData& model, Sample& sample, double* memory);
+
+// Operators of one step over one length of time, in panels (step_operators.cpp).
+struct StepOperators {
+    double length = 0;           // [s]
+    double* half = nullptr;      // [P_h Q_h]            states × columns
+    double* whole = nullptr;     // P                    states × states
+    double* first = nullptr;     // Q_1                  states × forces
+    double* combined = nullptr;  // Q1−3Q2+4Q3, 4Q2−8Q3, 4Q3−Q2   states × 3 forces
+    double* middle = nullptr;    // (h/2) φ_2(hL/2) S̃   states × forces
 };
 
 struct Mode;
@@ -50,11 +68,9 @@ struct Mode;
 struct ScratchData {
     explicit ScratchData(const ModelData& model);
     std::vector<double> buffer;
-    Sample begin, half, late, end, middle;
-    std::vector<double> input;       // latched, limited
+    Sample begin, end;           // live with the operators
+    Sample half, late, middle;
     std::vector<PairLoad> loads;
-    std::vector<TyreSoil> soils;
-    std::vector<EngineInput> engine_inputs;
     std::vector<unsigned char> before, trial, changed, violations;  // contact bytes
     std::vector<signed char> family;
     std::vector<double> vector_a, vector_b, vector_c;  // padded masses, states, torques or 3 × forces
@@ -67,6 +83,7 @@ struct ScratchData {
     std::vector<double> operator_memory;
     const Mode* begin_groups = nullptr;  // mode in which the tree's begin.groups hold for `begin`
     double torque_residual = 0;          // of the tree's internal torques at `end`
+    StepOperators used;              // by the last advance
 };
 
 }  // namespace shiftrig::plant::detail

@@ -76,7 +76,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
     // Torque capacities, external torques, internal torques, power-flow directions, internal torques with
     // losses ([Algin] eq. (11), (14), (15), (16)–(25)); what cannot hold at t0+ opens (eq. (12)).
-    Mode* mode = &settle(w, s.begin);
+    Mode* mode = &settle(w, s.begin, is_begun(w));
 
     for (double done = 0; done < 1;) {
         // Advance over what is left, up to the next jump of a law.
@@ -110,7 +110,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
             change_all(w, *mode, s.begin);
             outputs.certificate.fall_backs += localise;
         }
-        if (done < 1) mode = &settle(w, s.begin);
+        if (done < 1 || first.device >= 0) mode = &settle(w, s.begin);
     }
     finish_step(w, *mode);
 }

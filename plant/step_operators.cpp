@@ -29,7 +29,7 @@ struct Algebra {
     void multiply(const double* a, const double* b, int columns, double* c) const {
         to_panels(a, n, n, panels);
         for (int j = 0; j < columns; ++j) {
-            kernel.multiply(panels, stride / panel_rows, n, b + j * stride, nullptr, c + j * stride);
+            kernel.multiply(panels, stride, n, b + j * stride, nullptr, c + j * stride);
         }
     }
     void add_identity(double* a, double factor) const {
@@ -74,7 +74,7 @@ void build_step_operators(const ModelData& m, const Mode& mode, double length, S
                        : std::sqrt(m.structure.shafts[static_cast<std::size_t>(j - m.masses)].stiffness);
     }
     const auto rate = [&](int i, int c) {  // [L S̃](i, c)
-        return mode.rates[(i / panel_rows * m.columns + c) * panel_rows + i % panel_rows];
+        return mode.rates[panel_index(stride, m.columns, i, c)];
     };
     std::fill(z, z + size, 0.);
     std::fill(force, force + stride * m.forces, 0.);
@@ -82,7 +82,7 @@ void build_step_operators(const ModelData& m, const Mode& mode, double length, S
         for (int i = 0; i < n; ++i) z[j * stride + i] = 0.5 * length * rate(i, j) * sigma[i] / sigma[j];
     }
     for (int k = 0; k < m.forces; ++k) {
-        for (int i = 0; i < n; ++i) force[k * stride + i] = rate(i, stride + k) * sigma[i];
+        for (int i = 0; i < n; ++i) force[k * stride + i] = rate(i, n + k) * sigma[i];
     }
     int doublings = 0;
     double scale = 1;
@@ -129,24 +129,17 @@ void build_step_operators(const ModelData& m, const Mode& mode, double length, S
     // that a step lands on the constraints.
     const auto put = [&](double* panels, int columns, int c, const double* scaled) {
         std::copy(scaled, scaled + n, column);
-        for (int pass = 0; pass < 1; ++pass) {
-            for (int k = 0; k < mode.rank; ++k) {
-                const double* q = mode.basis + k * m.masses;
-                add_scaled(column, -dot(q, column, m.masses), q, m.masses);
-            }
+        for (int k = 0; k < mode.rank; ++k) {
+            const double* q = mode.basis + k * m.masses;
+            add_scaled(column, -dot(q, column, m.masses), q, m.masses);
         }
         for (int i = 0; i < stride; ++i) {
-            panels[(i / panel_rows * columns + c) * panel_rows + i % panel_rows] =
-                i < n ? column[i] / sigma[i] : 0;
+            panels[panel_index(stride, columns, i, c)] = i < n ? column[i] / sigma[i] : 0;
         }
     };
     const auto put_transition = [&](double* panels, int columns) {
-        for (int j = 0; j < stride; ++j) {
-            if (j < n) {
-                for (int i = 0; i < n; ++i) product[i] = phi0[j * stride + i] * sigma[j];
-            } else {
-                std::fill(product, product + n, 0.);
-            }
+        for (int j = 0; j < n; ++j) {
+            for (int i = 0; i < n; ++i) product[i] = phi0[j * stride + i] * sigma[j];
             put(panels, columns, j, product);
         }
     };
@@ -156,11 +149,16 @@ void build_step_operators(const ModelData& m, const Mode& mode, double length, S
     algebra.multiply(phi1, force, m.forces, product + size);
     for (int k = 0; k < m.forces; ++k) {
         for (int i = 0; i < n; ++i) product[i] = 0.5 * length * product[size + k * stride + i];
-        put(operators.half, m.columns, stride + k, product);
+        put(operators.half, m.columns, n + k, product);
+    }
+    algebra.multiply(phi2, force, m.forces, product + size);
+    for (int k = 0; k < m.forces; ++k) {
+        for (int i = 0; i < n; ++i) product[i] = 0.5 * length * product[size + k * stride + i];
+        put(operators.middle, m.forces, k, product);
     }
 
     double_step();
-    put_transition(operators.whole, stride);
+    put_transition(operators.whole, n);
     double* q1 = z;  // the powers have done their work; each holds `forces` columns if they fit
     double* q2 = take(stride * m.forces);
     double* q3 = take(stride * m.forces);

@@ -19,8 +19,9 @@ const Mesh& mesh_of(const Work& w, int mesh) { return w.model.structure.meshes[s
 
 // The slip that a contact byte is about.
 double device_slip(const Work& w, int device, const double* speeds) {
-    return device < w.model.pairs ? slip_of(pair_links(w, device), speeds)
-                                  : slip_of(mesh_of(w, device - w.model.pairs).motion(), speeds);
+    const ModelData& m = w.model;
+    return device < m.pairs ? slip_fast(m.pair_slip[static_cast<std::size_t>(device)], speeds)
+                            : slip_fast(m.mesh_motion[static_cast<std::size_t>(device - m.pairs)], speeds);
 }
 
 // Sum of magnitudes behind a slip: what its rounding errors are relative to.
@@ -63,7 +64,8 @@ bool rest_bound_meshes(const Work& w, const Mode& mode, unsigned char* contact) 
 
 // Loss directions that agree with the torques they lead to ([Algin] eq. (16)–(25), but decided by the lossy
 // torques): start from the present ones and flip the worst offender until there is none.
-Mode& find_directions(Work& w, unsigned char* contact, Sample& s) {
+// `complete`: the torques of the present states are in the sample.
+Mode& find_directions(Work& w, unsigned char* contact, Sample& s, bool complete = false) {
     const ModelData& m = w.model;
     const int most = 2 * m.meshes + 2;
     for (int flips = 0;; ++flips) {
@@ -71,11 +73,13 @@ Mode& find_directions(Work& w, unsigned char* contact, Sample& s) {
         ++w.outputs.certificate.mode_lookups;
         if (rest_bound_meshes(w, mode, contact)) {
             contact_forces(w, contact, s);
+            complete = false;
             continue;
         }
-        internal_torques(w, mode, s);
+        if (!complete) internal_torques(w, mode, s);
+        complete = false;
         int worst = -1;
-        double largest = 1e-9 * torque_scale(w, s);
+        double largest = -1;  // 1e-9 of the torque scale, once somebody asks
         for (int k = 0; k < m.meshes; ++k) {
             const unsigned char state = contact[m.pairs + k];
             const Mesh& mesh = mesh_of(w, k);
@@ -83,7 +87,9 @@ Mode& find_directions(Work& w, unsigned char* contact, Sample& s) {
             const double sign = motion_sign(state);
             const double torque = s.torque[m.pairs + k] - loss_kink(mesh, sign);
             const int x = torque * sign < 0 ? -1 : 1;
-            if (x != loss_exponent(state) && std::fabs(torque) > largest) {
+            if (x == loss_exponent(state)) continue;
+            if (largest < 0) largest = 1e-9 * torque_scale(w, s);
+            if (std::fabs(torque) > largest) {
                 largest = std::fabs(torque);
                 worst = k;
             }
@@ -99,11 +105,12 @@ Mode& find_directions(Work& w, unsigned char* contact, Sample& s) {
 }
 
 // Pairs by their capacity: none is free, some engages. [Algin]: a change of λ by pressure.
-void engage_and_release(Work& w, Sample& s) {
+bool engage_and_release(Work& w, Sample& s) {
     const ModelData& m = w.model;
     bool changed = false;
     for (int k = 0; k < m.pairs; ++k) {
         const bool capable = s.sliding[k] > 0 || s.holding[k] > 0 || is_pressed(w, k, s.at);
+        if (capable != (w.contact[k] == free_running)) continue;
         const double slip = slip_of(pair_links(w, k), s.z);
         if (!capable && w.contact[k] != free_running) {
             log_event(w, EventKind::release, k, s.at.time, s.torque[k], 0, slip);
@@ -120,6 +127,7 @@ void engage_and_release(Work& w, Sample& s) {
         }
     }
     if (changed) contact_forces(w, w.contact, s);
+    return changed;
 }
 
 // The locked pair that is loaded furthest beyond its static capacity.
@@ -263,10 +271,12 @@ bool violated(const Work& w, const Mode& mode, int device, const Sample& end) {
     if (device < m.pairs) {
         if (state == locked) return std::fabs(end.torque[device]) > overload * end.holding[device];
         if (state == free_running || mode.bound[device]) return false;
-        return slip_sign(state) * device_slip(w, device, end.z) < -1e-13 * slip_scale(w, device, end.z);
+    } else if (state == stuck || mode.bound[device] || !mesh_of(w, device - m.pairs).lossy()) {
+        return false;
     }
-    if (state == stuck || mode.bound[device] || !mesh_of(w, device - m.pairs).lossy()) return false;
-    return motion_sign(state) * device_slip(w, device, end.z) < -1e-13 * slip_scale(w, device, end.z);
+    const double sign = device < m.pairs ? slip_sign(state) : motion_sign(state);
+    const double slip = sign * device_slip(w, device, end.z);
+    return slip < 0 && slip < -1e-13 * slip_scale(w, device, end.z);
 }
 
 void close(Work& w, int device, Sample& s) {
@@ -307,7 +317,7 @@ void log_event(Work& w, EventKind kind, int device, double time, double torque, 
 void sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     if (mode.tree) return tree_sample_rate(w, mode, s);
     const ModelData& m = w.model;
-    m.kernel.multiply(mode.rates, m.states_padded / panel_rows, m.columns, s.z, nullptr, s.rate);
+    m.kernel.multiply(mode.rates, m.states_padded, m.columns, s.z, nullptr, s.rate);
 }
 
 double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
@@ -326,7 +336,7 @@ double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
     if (mode.tree) {
         tree_mobility(w, mode, momentum, joined);
     } else {
-        m.kernel.multiply(mode.mobility, padded(m.masses) / panel_rows, m.masses, momentum, nullptr, joined);
+        m.kernel.multiply(mode.mobility, padded(m.masses), m.masses, momentum, nullptr, joined);
     }
     std::copy(joined, joined + m.masses, speeds);
     return before - kinetic_energy();
@@ -370,15 +380,14 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
     w.scratch.dissipated += before - stored_energy(m, end.z);
     evaluate_forces(w, w.contact, end);
     internal_torques(w, turned, end);
-    sample_rate(w, turned, end);
     return turned;
 }
 
-Mode& settle(Work& w, Sample& s) SHIFTRIG_REALTIME {
-    evaluate_forces(w, w.contact, s);
-    engage_and_release(w, s);
-    for (int passes = 0;; ++passes) {
-        Mode& mode = find_directions(w, w.contact, s);
+Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
+    if (!complete) evaluate_forces(w, w.contact, s);
+    if (engage_and_release(w, s)) complete = false;
+    for (int passes = 0;; ++passes, complete = false) {
+        Mode& mode = find_directions(w, w.contact, s, complete);
         if (passes > 2 * w.model.contact_bytes + 2) return mode;
         const int overloaded = most_overloaded(w, s);
         if (overloaded >= 0) {

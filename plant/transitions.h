@@ -8,8 +8,8 @@ namespace shiftrig::plant::detail {
 // Brings contact states and loss directions into agreement with the sample's instant: engages and releases
 // pairs by their capacity, chooses every mesh's x by the lossy torques, opens what is overloaded ([Algin]
 // eq. (12)), lets stuck meshes go. Devices are only opened here, never closed, so it ends. Leaves forces
-// and internal torques of the settled mode in the sample.
-Mode& settle(Work& work, Sample& sample) SHIFTRIG_REALTIME;
+// and internal torques of the settled mode in the sample. `complete`: forces and torques are there already.
+Mode& settle(Work& work, Sample& sample, bool complete = false) SHIFTRIG_REALTIME;
 
 struct Crossing {
     int device = -1;   // contact byte: pair or pairs + mesh; −1: nobody changes

@@ -157,6 +157,11 @@ struct HydraulicStep {
         return s >= filled_from ? valve.at(s) : spring_begin + (spring_end - spring_begin) * s;
     }
     bool jumps() const noexcept { return filled_from > 0 && filled_from <= 1; }
+    // The same pressure all the time.
+    bool rests() const noexcept {
+        return valve.begin == valve.end && valve.begin == valve.middle &&
+               (filled_from <= 0 || (filled_from > 1 && spring_begin == spring_end));
+    }
 };
 
 // Flow that this piston wants at the start of the step [m³/s]; the pump's share is min(1, pump_flow/Σ

@@ -9,6 +9,8 @@ struct StepValues {
 
     // At the fraction s of the step, by the parabola through the three.
     double at(double s) const noexcept {
+        if (s == 0) return begin;
+        if (s == 1) return end;
         const double d1 = 4 * middle - 3 * begin - end;
         const double d2 = 2 * (begin - 2 * middle + end);
         return begin + s * (d1 + s * d2);
