@@ -89,6 +89,7 @@ void Rig::begin() {
         copy_inputs();
     } else {
         const auto& scenario = *setup_.scenario;
+        io::check_signals(scenario, signals_);
         timeline_ = Timeline(scenario, signals_, settable_);
         for (const auto& setting : scenario.start.inputs)
             signals_.value[static_cast<std::size_t>(find_settable(signals_, settable_, scenario.path, setting.quantity))] =
