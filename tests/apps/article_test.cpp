@@ -69,6 +69,25 @@ TEST(Article, UnfavourableTimingSlipsMainClutchAndWheelContactUnderAHigherShaftT
     EXPECT_GT(bad.peak_shaft_torque, 1.5 * good.peak_shaft_torque);
 }
 
+TEST(Scenario, ASignalWithoutItsUnitIsRefusedBeforeTheFirstTick) {
+    const std::string path =
+        SHIFTRIG_SOURCE_DIR "/config/scenarios/wrong.yaml";  // nothing is read from there
+    const auto scenario = io::parse_scenario(
+        "model: ../tractor.yaml\n"
+        "duration_s: 1\n"
+        "start: {inputs: {clutch.F2.pressure_command: 18}}\n",
+        path);
+    try {
+        const rig::Rig rig(rig::make_setup({}, scenario));
+        FAIL();
+    } catch (const io::InputError& error) {
+        EXPECT_EQ(std::string(error.what()),
+                  path +
+                      ":3:18: clutch.F2.pressure_command must be written with its unit: "
+                      "clutch.F2.pressure_command ends in _pa or _bar");
+    }
+}
+
 TEST(HoldOnSlope, StandsStillForTenMinutes) {
     double stopped_at = -1, reference = NAN, farthest = 0, last_time = 0;
     run("hold_on_slope", [&](const rig::Rig& rig) {
