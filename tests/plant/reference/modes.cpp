@@ -116,8 +116,11 @@ Response Responses::build(const Mode& mode) const {
     }
     response.projector = Matrix::Identity(n, n);
     if (r > 0) {
-        const Matrix scaled = c.completeOrthogonalDecomposition().pseudoInverse();
-        response.projector -= root.asDiagonal() * (c * scaled) * root.cwiseInverse().asDiagonal();
+        Eigen::CompleteOrthogonalDecomposition<Matrix> decomposition;
+        decomposition.setThreshold(dependent);
+        decomposition.compute(c);
+        response.projector -= root.asDiagonal() * (c * decomposition.pseudoInverse()) *
+                              root.cwiseInverse().asDiagonal();
     }
     return response;
 }

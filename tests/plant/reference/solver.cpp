@@ -32,8 +32,8 @@ Solver::Solver(const System& system) : z(system.start), system_(system), respons
     extra_ = Vector::Zero(system.extras);
 }
 
-double Solver::speed_scale() const {
-    return std::max(1.0, z.head(system_.masses).lpNorm<Eigen::Infinity>());
+double Solver::speed_scale(const Vector& state) const {
+    return std::max(1.0, state.head(system_.masses).lpNorm<Eigen::Infinity>());
 }
 
 void Solver::note(double time, const std::string& device, const char* what) {
@@ -203,7 +203,7 @@ void Solver::join() {
     auto omega = z.head(system_.masses);
     const Matrix& projector = responses_.of(mode).projector;
     omega = (projector * omega).eval();
-    const double small = 1e-10 * speed_scale();
+    const double small = 1e-10 * speed_scale(z);
     const auto pinned = [&](const Vector& column) {
         return (projector.transpose() * column).norm() < 1e-8 * column.norm() &&
                std::abs(column.dot(omega)) < small;
@@ -237,7 +237,7 @@ void Solver::settle(When when) {
         for (std::size_t f = 0; f < system_.frictions.size() && !closed; ++f) {
             const double s = sign_of(mode.friction[f]);
             const auto& column = system_.frictions[f].column;
-            if (s == 0 || std::abs(column.dot(z.head(system_.masses))) > 1e-10 * speed_scale()) continue;
+            if (s == 0 || std::abs(column.dot(z.head(system_.masses))) > 1e-10 * speed_scale(z)) continue;
             if (s * column.dot(work_.acceleration) >= -acceleration_tolerance(column, work_)) continue;
             mode.friction[f] = Hold::held;
             note(when.t, system_.frictions[f].name, "locks");
@@ -267,7 +267,7 @@ void Solver::begin(double inside) {
 void Solver::margins(When when, const Vector& state, Vector& g) {
     solve(when, state, mode, work_);
     g.resize(static_cast<Eigen::Index>(2 * system_.frictions.size() + 2 * system_.meshes.size()));
-    const double speed_tolerance = 1e-12 * speed_scale();
+    const double speed_tolerance = 1e-12 * speed_scale(state);
     // Twice what consistent() asks for: a mode it accepts is not left at once.
     const double torque_tolerance = 2e-9 * (work_.free.lpNorm<Eigen::Infinity>() + 1e-6);
     Eigen::Index i = 0;
@@ -351,6 +351,8 @@ Sample Solver::sample(When when) {
             const double slip = system_.frictions[f].column.dot(z.head(system_.masses));
             s.friction_torque[static_cast<Eigen::Index>(f)] =
                 sign * system_.frictions[f].sliding(when, z, slip);
+            // Pushes against devices that hold: they share the load as their history has it.
+            if (std::abs(slip) < 1e-9) resting = true;
         }
     }
     s.mesh_torque = work_.mesh;

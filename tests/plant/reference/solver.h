@@ -74,7 +74,7 @@ class Solver {
     void join();
     void note(double time, const std::string& device, const char* what);
     double acceleration_tolerance(const Vector& column, const Torques& torques) const;
-    double speed_scale() const;
+    double speed_scale(const Vector& state) const;
     struct Energy {
         double input = 0, dissipated = 0;
     };
