@@ -23,3 +23,12 @@ add_executable(can_socketcan_test ${CMAKE_CURRENT_LIST_DIR}/can_socketcan_test.c
 target_link_libraries(can_socketcan_test PRIVATE shiftrig_can GTest::gtest_main)
 add_test(NAME can_socketcan_test COMMAND can_socketcan_test)
 set_tests_properties(can_socketcan_test PROPERTIES LABELS vcan)
+
+shiftrig_can_test(can_fuzz_test ${CMAKE_CURRENT_LIST_DIR}/count_allocations.cpp)
+option(SHIFTRIG_FUZZ "build the libFuzzer targets (clang)" OFF)
+if(SHIFTRIG_FUZZ)
+  add_executable(can_fuzzer ${CMAKE_CURRENT_LIST_DIR}/can_fuzzer.cpp)
+  target_link_libraries(can_fuzzer PRIVATE shiftrig_can)
+  target_compile_definitions(can_fuzzer PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  target_link_options(can_fuzzer PRIVATE -fsanitize=fuzzer)
+endif()
