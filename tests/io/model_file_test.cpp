@@ -156,6 +156,18 @@ TEST(ModelFile, EveryCommandedClutchHasASafeCommand) {
     EXPECT_EQ(small.controller.command_timeout, 0.1);
 }
 
+TEST(ModelFile, AClutchWithASolenoidIsCommandedByCurrent) {
+    const auto file = parse_model(
+        two_masses + wet_clutch +
+            "      solenoid: {pressure_over_current_a_bar: [[0.2, 0], [1.0, 18]], hysteresis_a: 0.02}\n",
+        "m.yaml");
+    const auto& valve = std::get<plant::ActuationHydraulic>(file.description.clutches.at(0).actuation);
+    ASSERT_TRUE(valve.solenoid);
+    EXPECT_EQ(valve.solenoid->pressure_over_current.back(), (std::pair<double, double>{1.0, 18e5}));
+    EXPECT_EQ(valve.solenoid->hysteresis, 0.02);
+    EXPECT_EQ(file.controller.safe_commands.at(0).signal, "clutch.F2.current_command");
+}
+
 TEST(ModelFile, ThePartOfAnotherReaderIsHandedThrough) {
     EXPECT_FALSE(parse_model(two_masses, "m.yaml").can.IsDefined());
     const auto file = parse_model(two_masses + "can:\n  bit_rate: 250000\n", "m.yaml");
