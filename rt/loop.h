@@ -72,6 +72,7 @@ struct LoopReport {
     std::int64_t clock_reversals = 0;   // times the clock was seen to go back
     std::int64_t anchors = 0;           // times the grid was moved on request
     std::int64_t began = 0, ended = 0;  // [ns] of the clock
+    std::int64_t late_after = 0;        // what counted as late in the end [ns]
     Histogram wake_up;                  // how long after the asked time a sleep ended (what cyclictest shows)
     Histogram lateness;  // wall pace: start − deadline of every slot, slept for or not, executed or skipped
     Histogram step;      // duration of the callable
@@ -238,6 +239,7 @@ class Loop {
     }
     const LoopReport& end(Outcome outcome) noexcept {
         report_.outcome = outcome;
+        report_.late_after = late_after_;
         report_.ended = now();
         return report_;
     }

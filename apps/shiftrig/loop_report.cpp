@@ -36,6 +36,8 @@ nlohmann::json to_json(const rt::LoopReport& report) {
             {"executed", report.executed},
             {"skipped", report.skipped},
             {"late", report.late},
+            {"late_after_ns", report.late_after},
+            {"late_wake_ups", report.wake_up.count_above(report.late_after)},
             {"longest_late_run", report.longest_late_run},
             {"late_runs", report.late_runs},
             {"overruns", report.overruns},
