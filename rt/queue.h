@@ -33,21 +33,15 @@ class Queue {
     std::size_t size_approx() const noexcept { return queue_.size_approx(); }
 
   private:
-    // The library's functions carry no mark. try_enqueue and try_dequeue neither allocate nor lock; the
-    // compiler's static check is silenced here and nowhere else, RealtimeSanitizer still watches them run.
-#if defined(__clang__) && __clang_major__ >= 20
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wfunction-effects"
-#endif
+    // The library's functions carry no mark; try_enqueue and try_dequeue neither allocate nor lock.
+    SHIFTRIG_TRUSTED_BEGIN
     bool try_enqueue(const T& value) SHIFTRIG_REALTIME {
         return queue_.try_enqueue(value);
     }
     bool try_dequeue(T& value) SHIFTRIG_REALTIME {
         return queue_.try_dequeue(value);
     }
-#if defined(__clang__) && __clang_major__ >= 20
-#pragma clang diagnostic pop
-#endif
+    SHIFTRIG_TRUSTED_END
 
     moodycamel::ReaderWriterQueue<T> queue_;
     std::atomic<std::int64_t> dropped_{0};

@@ -32,16 +32,16 @@ Collector::Collector(const Rig& rig, std::int64_t ticks, const CollectorOptions&
     capacity_ = static_cast<std::size_t>(ticks);
     if (!fits(signals_.size())) capacity_ = options.most_bytes / sizeof(double) / (signals_.size() + 1);
 
-    run_.time.resize(capacity_);
-    for (const int i : signals_) run_.columns.push_back({table.signal(i), std::vector<double>(capacity_)});
+    rows_.resize(capacity_ * (signals_.size() + 1));
     plant_events_.reserve(options.most_events);
     rig_events_.reserve(options.most_events);
 }
 
 void Collector::take(const Rig& rig) SHIFTRIG_REALTIME {
     if (count_ < capacity_) {
-        run_.time[count_] = rig.sim_time();
-        for (std::size_t c = 0; c < signals_.size(); ++c) run_.columns[c].value[count_] = rig.value(signals_[c]);
+        double* row = &rows_[count_ * (signals_.size() + 1)];
+        *row++ = rig.sim_time();
+        for (const int signal : signals_) *row++ = rig.value(signal);
         ++count_;
     } else {
         ++left_out_;
@@ -58,28 +58,35 @@ void Collector::take(const Rig& rig) SHIFTRIG_REALTIME {
 }
 
 analysis::Run Collector::finish(const Rig& rig) {
-    run_.time.resize(count_);
-    for (auto& column : run_.columns) column.value.resize(count_);
+    analysis::Run run;
+    run.time.resize(count_);
+    for (const int signal : signals_) run.columns.push_back({rig.signals().signal(signal), std::vector<double>(count_)});
+    const double* row = rows_.data();
+    for (std::size_t i = 0; i < count_; ++i) {
+        run.time[i] = *row++;
+        for (auto& column : run.columns) column.value[i] = *row++;
+    }
+    rows_ = {};
     const auto& devices = rig.model().device_names();
     for (const auto& event : plant_events_)
-        run_.changes.push_back({event, event.device >= 0 ? devices[static_cast<std::size_t>(event.device)] : "",
+        run.changes.push_back({event, event.device >= 0 ? devices[static_cast<std::size_t>(event.device)] : "",
                                 plant::explain(rig.model(), event), std::string(io::name(event.kind))});
     for (const auto& event : rig_events_) {
         analysis::Change change;
         change.event.time = event.time;
         change.text = explain(rig.signals(), event);
         change.kind = name(event.kind);
-        run_.changes.push_back(std::move(change));
+        run.changes.push_back(std::move(change));
     }
-    std::stable_sort(run_.changes.begin(), run_.changes.end(),
+    std::stable_sort(run.changes.begin(), run.changes.end(),
                      [](const auto& a, const auto& b) { return a.event.time < b.event.time; });
     const auto& setup = rig.setup();
-    run_.machine = setup.model.description;
-    run_.model_text = setup.model.text;
-    if (setup.scenario) run_.identity.emplace_back("scenario", setup.scenario->name);
-    run_.identity.emplace_back("model", run_.machine.name);
-    run_.identity.emplace_back("kernel", std::string(rig.model().kernel()));
-    return std::move(run_);
+    run.machine = setup.model.description;
+    run.model_text = setup.model.text;
+    if (setup.scenario) run.identity.emplace_back("scenario", setup.scenario->name);
+    run.identity.emplace_back("model", run.machine.name);
+    run.identity.emplace_back("kernel", std::string(rig.model().kernel()));
+    return run;
 }
 
 }  // namespace shiftrig::rig

@@ -4,24 +4,45 @@
 
 namespace shiftrig::rig {
 
+namespace {
+
+using Hook = std::function<void(Rig&, const rt::Tick&)>;
+
+// Who sets a hook keeps the loop's promise.
+SHIFTRIG_TRUSTED_BEGIN
+void call(const Hook& hook, Rig& rig, const rt::Tick& tick) SHIFTRIG_REALTIME {
+    if (hook) hook(rig, tick);
+}
+SHIFTRIG_TRUSTED_END
+
+}  // namespace
+
 Session::Session(Rig& rig, SessionOptions options) : rig_(rig), options_(std::move(options)), loop_(options_.loop) {
     if (options_.trace) {
         span_tick_ = options_.trace->name("tick");
         span_record_ = options_.trace->name("record");
     }
-    if (options_.recording) options_.recording->begin(manifest_of(rig, options_.loop));
+    if (options_.recording) {
+        io::Manifest manifest = manifest_of(rig, options_.loop);
+        for (const auto& [key, value] : options_.facts) manifest.facts[key] = value;
+        options_.recording->begin(manifest);
+    }
 }
 
 const rt::LoopReport& Session::run() {
     started_ns_ = clock_.now();
-    return loop_.run([this](const rt::Tick& t) { tick(t); },
-                     [this](std::int64_t timeout_ns) { return rig_.wait_for_answer(timeout_ns); });
+    // Paces that can wait lose no tick of the recording.
+    const bool waits = options_.recording && options_.loop.pace != rt::Pace::wall;
+    return loop_.run(
+        [this, waits](const rt::Tick& t) {
+            if (waits) options_.recording->wait_for_room();
+            tick(t);
+        },
+        [this](std::int64_t timeout_ns) { return rig_.wait_for_answer(timeout_ns); });
 }
 
-void Session::tick(const rt::Tick& t) {
-    // Paces that can wait lose no tick of the recording.
-    if (options_.recording && options_.loop.pace != rt::Pace::wall) options_.recording->wait_for_room();
-    if (options_.before) options_.before(rig_, t);
+void Session::tick(const rt::Tick& t) SHIFTRIG_REALTIME {
+    call(options_.before, rig_, t);
 
     const std::int64_t began = clock_.now();
     // Without a wall clock no signal depends on it: two runs give the same recording.
@@ -31,17 +52,18 @@ void Session::tick(const rt::Tick& t) {
     rig_.tick();
     const std::int64_t ended = clock_.now();
     compute_ns_ = ended - began;
+    rig_time_.record(compute_ns_);
 
     if (options_.recording) record(t, began);
     if (options_.collector) options_.collector->take(rig_);
-    if (options_.after) options_.after(rig_, t);
+    call(options_.after, rig_, t);
     if (options_.trace) {
         options_.trace->span(span_tick_, began, ended, t.slot);
         options_.trace->span(span_record_, ended, clock_.now(), t.slot);
     }
 }
 
-void Session::record(const rt::Tick& t, std::int64_t began) {
+void Session::record(const rt::Tick& t, std::int64_t began) SHIFTRIG_REALTIME {
     io::TickRecord r;
     r.tick = rig_.ticks() - 1;
     r.sim_time_ns = rig_.sim_time_ns();

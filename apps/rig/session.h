@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct SessionOptions {
     io::RecordingWriter* recording = nullptr;   // begun by the session, not ended
     Collector* collector = nullptr;
     rt::Trace* trace = nullptr;
+    std::map<std::string, std::string> facts;   // said in the recording besides those of manifest_of
     // In the loop, before and after every tick. Whoever sets them keeps the loop's promise: no waiting, no allocation.
     std::function<void(Rig&, const rt::Tick&)> before, after;
 };
@@ -32,15 +34,18 @@ class Session {
     // The whole run, in the calling thread.
     const rt::LoopReport& run();
     const rt::LoopReport& report() const noexcept { return loop_.report(); }  // whole when run() has returned
+    // How long the rig's tick took, of the loop's step: receive, decide, step, send, without recording and showing.
+    const rt::Histogram& rig_time() const noexcept { return rig_time_; }
 
   private:
-    void tick(const rt::Tick& tick);
-    void record(const rt::Tick& tick, std::int64_t began);
+    void tick(const rt::Tick& tick) SHIFTRIG_REALTIME;
+    void record(const rt::Tick& tick, std::int64_t began) SHIFTRIG_REALTIME;
 
     Rig& rig_;
     SessionOptions options_;
     rt::Loop<> loop_;
     rt::SteadyClock clock_;
+    rt::Histogram rig_time_;
     rt::Trace::Name span_tick_ = 0, span_record_ = 0;
     std::int64_t compute_ns_ = 0, started_ns_ = 0;
 };

@@ -22,6 +22,7 @@
 #include "io/recording/event_names.h"
 #include "io/recording/reader.h"
 #include "io/recording/snapshot.h"
+#include "rt/machine.h"
 
 namespace shiftrig::cli {
 
@@ -116,12 +117,20 @@ nlohmann::json result_json(const rig::Rig& rig, const rt::LoopReport& report, co
     return result;
 }
 
+std::string in_one_line(const rt::Refusals& refusals) {
+    std::string line;
+    for (const auto& refusal : refusals) {
+        if (!line.empty()) line += " | ";
+        line += rt::to_string(refusal);
+    }
+    return line;
+}
+
 // Runs the loop in a thread of its own; this one shows the live line and watches the controller's process.
-rt::Refusals run_loop(rig::Session& session, const RunOptions& options, LiveLine& live, Child* controller) {
-    rt::Refusals refusals;
+void run_loop(rig::Session& session, const RunOptions& options, LiveLine& live, Child* controller) {
     std::atomic<bool> done{false};
     std::thread plant([&] {
-        refusals = prepare_thread(options);
+        prepare_thread(options);
         session.run();
         done = true;
     });
@@ -133,7 +142,6 @@ rt::Refusals run_loop(rig::Session& session, const RunOptions& options, LiveLine
     }
     plant.join();
     live.end();
-    return refusals;
 }
 
 // Closes what was recorded; false if something of it is lost.
@@ -159,11 +167,12 @@ bool finish(const RunOptions& options, Beside& beside) {
     return whole;
 }
 
-void print_summary(const rig::Rig& rig, const rt::LoopReport& report, const analysis::Scorecard& scorecard) {
+void print_summary(const rig::Rig& rig, const rig::Session& session, const analysis::Scorecard& scorecard) {
+    const rt::LoopReport& report = session.report();
     const double wall = static_cast<double>(report.ended - report.began) * 1e-9;
     std::printf("%lld ticks, %.6g s simulated in %.3g s (%.3g times real time)\n", static_cast<long long>(report.executed),
                 rig.sim_time(), wall, wall > 0 ? rig.sim_time() / wall : 0);
-    std::cout << describe(report);
+    std::cout << describe(report) << "rig tick  " << session.rig_time().percentiles() << '\n';
     if (!scorecard.shifts.empty()) std::cout << '\n' << analysis::to_text(scorecard);
 }
 
@@ -174,6 +183,10 @@ int run(const RunOptions& options) {
 
     rt::AwakeProcessors awake;
     rt::Refusals refusals = prepare_process(options, awake);
+    // What the plant thread will not be granted is asked for in advance, so that the recording can begin with it.
+    std::thread([&] {
+        for (auto& refusal : prepare_thread(options)) refusals.push_back(std::move(refusal));
+    }).join();
     rt::LoopSettings loop = options.loop(rig.setup());
     if (loop.slots > 0) loop.slots = std::max<std::int64_t>(0, loop.slots - rig.ticks());  // a snapshot has done some
     std::optional<rig::SnapshotTaker> taker;
@@ -186,6 +199,8 @@ int run(const RunOptions& options) {
     session_options.recording = beside.recording.get();
     session_options.collector = beside.collector.get();
     session_options.trace = beside.trace.get();
+    session_options.facts["not granted"] = in_one_line(refusals);
+    session_options.facts["machine"] = rt::describe_machine();
     session_options.after = [&](rig::Rig& each, const rt::Tick&) {
         live.take(each);
         if (taker) taker->offer(each);
@@ -196,8 +211,7 @@ int run(const RunOptions& options) {
     if (const auto command = rig::controller_command(options.choices); !command.empty()) controller.emplace(command);
     {
         const SignalsStop signals_stop(session.control());
-        for (auto& refusal : run_loop(session, options, live, controller ? &*controller : nullptr))
-            refusals.push_back(std::move(refusal));
+        run_loop(session, options, live, controller ? &*controller : nullptr);
     }
     controller.reset();
 
@@ -211,10 +225,14 @@ int run(const RunOptions& options) {
     const analysis::Run collected = beside.collector->finish(rig);
     if (taker) taker->write(options.snapshot_at.second, rig, loop, collected);
     const auto scorecard = analysis::score(collected);
-    if (options.json)
-        std::cout << result_json(rig, report, collected, scorecard).dump() << '\n';
-    else
-        print_summary(rig, report, scorecard);
+    if (options.json) {
+        nlohmann::json result = result_json(rig, report, collected, scorecard);
+        result["loop"]["rig_tick_ns"] = to_json(session.rig_time());
+        result["not_granted"] = to_json(refusals);
+        std::cout << result.dump() << '\n';
+    } else {
+        print_summary(rig, session, scorecard);
+    }
     const bool ended_well = report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped;
     return whole && ended_well ? good : failed;
 }
