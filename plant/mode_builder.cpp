@@ -73,7 +73,7 @@ ModeSizes::ModeSizes(const ModelData& m) {
     key = (m.contact_bytes + 7) / 8 * 8;
 }
 
-StepOperators place_operators(const ModelData& m, double* memory) noexcept {
+StepOperators place_operators(const ModelData& m, double* memory) SHIFTRIG_REALTIME {
     StepOperators o;
     o.half = memory;
     o.whole = o.half + panel_size(m.states, m.columns);

@@ -49,7 +49,7 @@ struct ModeSizes {
     int doubles() const noexcept { return basis + mobility + rates + torques + operators; }
 };
 
-StepOperators place_operators(const ModelData& model, double* memory) noexcept;
+StepOperators place_operators(const ModelData& model, double* memory) SHIFTRIG_REALTIME;
 
 // Doubles and ints of working memory that build_mode and build_step_operators need.
 int workspace_doubles(const ModelData& model) noexcept;

@@ -171,9 +171,11 @@ struct CandumpLogger::Data {
         stop = true;
         writer.join();
     }
+    SHIFTRIG_TRUSTED_BEGIN  // try_enqueue never allocates
     void note(std::int64_t now_ns, const Frame& frame, Direction direction) SHIFTRIG_REALTIME {
         if (!queue.try_enqueue({frame, now_ns, direction})) lost.fetch_add(1, std::memory_order_relaxed);
     }
+    SHIFTRIG_TRUSTED_END
     // Polls: the loop must not be burdened with waking somebody for a log.
     void write() {
         std::string text;

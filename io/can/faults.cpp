@@ -123,6 +123,7 @@ void FaultyPort::advance(std::int64_t now_ns) SHIFTRIG_REALTIME {
         if (!off_) port_.send(now_ns, frame);
 }
 
+SHIFTRIG_TRUSTED_BEGIN
 void FaultyPort::enqueue(const Frame& frame, std::int64_t due_ns, Way way) SHIFTRIG_REALTIME {
     auto& heap = waiting_[static_cast<std::size_t>(way)];
     if (heap.size() == kMostWaiting) {
@@ -132,6 +133,7 @@ void FaultyPort::enqueue(const Frame& frame, std::int64_t due_ns, Way way) SHIFT
     heap.push_back({due_ns, order_++, frame});  // within the reserved capacity
     std::push_heap(heap.begin(), heap.end());
 }
+SHIFTRIG_TRUSTED_END
 
 bool FaultyPort::take(std::int64_t now_ns, Way way, Frame& frame) SHIFTRIG_REALTIME {
     auto& heap = waiting_[static_cast<std::size_t>(way)];

@@ -75,7 +75,7 @@ int worst_case_classic_bits(bool extended, int data_bytes) noexcept {
     return stuffed + (stuffed - 1) / 4 + kTrailer;
 }
 
-std::int64_t duration_ns(const Frame& frame, double bit_rate, double data_bit_rate) noexcept {
+std::int64_t duration_ns(const Frame& frame, double bit_rate, double data_bit_rate) SHIFTRIG_REALTIME {
     if (!frame.fd) return std::llround(classic_bits(frame) * 1e9 / bit_rate);
     // ISO 11898-1: SOF, identifier and control bits up to BRS; then ESI, DLC, data, stuff count (4), CRC (17
     // or 21, with a fixed stuff bit before every fourth).

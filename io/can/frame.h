@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 
+#include "plant/realtime.h"
+
 namespace shiftrig::io::can {
 
 struct Frame {
@@ -43,6 +45,6 @@ int classic_bits(const Frame& frame) noexcept;
 int worst_case_classic_bits(bool extended, int data_bytes) noexcept;
 // Time on the wire [ns]. FD frames: arbitration at `bit_rate`, data phase at `data_bit_rate` (bit-rate
 // switch), worst-case stuffing, so never too short.
-std::int64_t duration_ns(const Frame& frame, double bit_rate, double data_bit_rate) noexcept;
+std::int64_t duration_ns(const Frame& frame, double bit_rate, double data_bit_rate) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::io::can
