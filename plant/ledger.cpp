@@ -59,6 +59,62 @@ double fill_middle(Work& w, const Mode& mode) {
     return h / 6 * (damping_losses(w, begin) + 4 * damping_losses(w, middle) + damping_losses(w, end));
 }
 
+// The parabola through the forces at start, middle and end with which the step was made, at the fraction s.
+void forces_at(const ScratchData& scratch, int count, double s, double* f) {
+    const double w0 = (1 - s) * (1 - 2 * s), w1 = 4 * s * (1 - s), w2 = s * (2 * s - 1);
+    for (int k = 0; k < count; ++k) f[k] = w0 * scratch.begin.f[k] + w1 * scratch.half.f[k] + w2 * scratch.late.f[k];
+}
+
+// Stiff shafts swing or die out within a step, where three points see nothing of them. The step's own solution is
+// followed through many parts (exact, as the step is) and the powers are summed over these.
+void book_finely(Work& w, const Mode& mode) {
+    const ModelData& m = w.model;
+    ScratchData& s = w.scratch;
+    const double h = s.end.at.time - s.begin.at.time;
+    StepOperators op = mode.ledger;
+    int parts = mode.ledger_parts;
+    if (s.used.length != mode.step.length) {
+        parts = std::max(2, 2 * static_cast<int>(0.5 * parts * h / w.h + 1));
+        op = place_operators(m, s.ledger_memory.data());
+        build_step_operators(m, mode, h / parts, op, s.workspace.data());
+    }
+    Sample& at = s.middle;
+    double* forces = s.vector_c.data();     // at start, middle and end of a part
+    double* moved = s.vector_a.data();
+    std::copy(s.begin.z, s.begin.z + m.states, at.z);
+    double external_work = 0;
+    for (int part = 0;; ++part) {
+        forces_at(s, m.forces, static_cast<double>(part) / parts, at.f);
+        const double weight = h / parts / 3 * (part == 0 || part == parts ? 1 : part % 2 ? 4 : 2);  // Simpson
+        internal_torques(w, mode, at);
+        at.field_power = 0;
+        double loss = field_and_mesh_losses(w, mode, at) + damping_losses(w, at);
+        for (int k = 0; k < m.pairs; ++k) {
+            if (w.contact[k] == locked) continue;
+            const double power = at.f[k] * slip_fast(m.pair_slip[static_cast<std::size_t>(k)], at.z);
+            s.heat[static_cast<std::size_t>(k)] += weight * power;
+            loss += power;
+        }
+        s.dissipated += weight * loss;
+        for (int k = m.first_external; k < m.forces; ++k) {
+            external_work -= weight * at.f[k] * slip_fast(m.force_on[static_cast<std::size_t>(k)], at.z);
+        }
+        for (std::size_t i = 0; i < m.translating.size(); ++i) {
+            w.next[m.layout.distances + static_cast<int>(i)] += weight * at.z[m.translating[i]];
+        }
+        if (part == parts) break;
+        std::copy(at.f, at.f + m.forces, forces);
+        forces_at(s, m.forces, (part + 0.5) / parts, forces + m.forces);
+        forces_at(s, m.forces, (part + 1.) / parts, forces + 2 * m.forces);
+        m.kernel.multiply(op.whole, m.states_padded, m.states, at.z, nullptr, moved);
+        m.kernel.multiply(op.combined, m.states_padded, 3 * m.forces, forces, moved, at.z);
+    }
+    // What tyres and converters lose goes through external forces: the rest of these is input.
+    const double field = h / 6 * (s.begin.field_power + 4 * s.half.field_power + s.end.field_power);
+    s.dissipated += field;
+    s.input_work += external_work + field;
+}
+
 }  // namespace
 
 double stored_energy(const ModelData& m, const double* z) SHIFTRIG_REALTIME {
@@ -76,6 +132,7 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     Sample &begin = w.scratch.begin, &middle = w.scratch.middle, &end = w.scratch.end;
     const double h = end.at.time - begin.at.time;
+    if (!mode.tree && mode.ledger_parts > 1) return book_finely(w, mode);
     w.scratch.dissipated += mode.tree ? tree_middle(w, mode) : fill_middle(w, mode);
 
     const auto simpson = [h](double a, double b, double c) { return h / 6 * (a + 4 * b + c); };

@@ -69,7 +69,7 @@ ModeSizes::ModeSizes(const ModelData& m) {
     mobility = panel_size(m.masses, m.masses);
     rates = panel_size(m.states, m.columns);
     torques = panel_size(m.torques, m.columns);
-    operators = panel_size(m.states, m.columns + m.states + 5 * m.forces);
+    operators = panel_size(m.states, m.columns + m.states + 5 * m.forces);  // of one length
     key = (m.contact_bytes + 7) / 8 * 8;
 }
 

@@ -38,6 +38,8 @@ struct Mode {
     double* rates = nullptr;         // [L S̃]             panels, states × columns
     double* torques = nullptr;       // [R_z R_f]         panels, rows × columns
     StepOperators step;              // for the model's step size
+    int ledger_parts = 1;            // into how many parts the ledger divides a step: stiff shafts swing within it
+    StepOperators ledger;            // for one of them
     TreeMode* tree = nullptr;        // instead of all matrices, on the engine for long chains
 };
 
@@ -46,7 +48,7 @@ struct ModeSizes {
     int basis = 0, mobility = 0, rates = 0, torques = 0, operators = 0;
     int key = 0;  // bytes, a multiple of 8
     explicit ModeSizes(const ModelData& model);
-    int doubles() const noexcept { return basis + mobility + rates + torques + operators; }
+    int doubles() const noexcept { return basis + mobility + rates + torques + 2 * operators; }
 };
 
 StepOperators place_operators(const ModelData& model, double* memory) SHIFTRIG_REALTIME;
@@ -60,8 +62,8 @@ void mode_key(const ModelData& model, const unsigned char* contact, unsigned cha
 // Everything of a mode but its step operators. `mode.key` is set by the caller.
 void build_mode(const ModelData& model, Mode& mode, double* workspace, int* integers) SHIFTRIG_REALTIME;
 
-// The operators of one step of `length` in the mode.
-void build_step_operators(const ModelData& model, const Mode& mode, double length, StepOperators& operators,
+// The operators of one step of `length` in the mode. Returns how often the length was halved to make h L small.
+int build_step_operators(const ModelData& model, const Mode& mode, double length, StepOperators& operators,
                           double* workspace) SHIFTRIG_REALTIME;
 
 // The cache: a table of bounded size, least recently used goes.

@@ -54,6 +54,7 @@ void OperatorsData::place_matrices(const ModelData& m) {
         mode.rates = mode.mobility + sizes.mobility;
         mode.torques = mode.rates + sizes.rates;
         mode.step = place_operators(m, mode.torques + sizes.torques);
+        mode.ledger = place_operators(m, mode.torques + sizes.torques + sizes.operators);
         at += per_mode;
     }
 }
@@ -98,7 +99,12 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
         build_tree_mode(m, *oldest);
     } else {
         build_mode(m, *oldest, scratch.workspace.data(), scratch.workspace_index.data());
-        build_step_operators(m, *oldest, m.options.step_size, oldest->step, scratch.workspace.data());
+        const double h = m.options.step_size;
+        const int halvings = build_step_operators(m, *oldest, h, oldest->step, scratch.workspace.data());
+        oldest->ledger_parts = halvings == 0 ? 1 : 4 << std::min(halvings, 6);
+        if (halvings > 0) {
+            build_step_operators(m, *oldest, h / oldest->ledger_parts, oldest->ledger, scratch.workspace.data());
+        }
     }
     oldest->last_use = ++o.clock;
     o.recent = oldest;

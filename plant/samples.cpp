@@ -48,7 +48,9 @@ ScratchData::ScratchData(const ModelData& m) {
     workspace.assign(static_cast<std::size_t>(m.tree ? TreeWork::doubles(m) : workspace_doubles(m)), 0.);
     if (m.tree) return;
     workspace_index.assign(static_cast<std::size_t>(workspace_integers(m)), 0);
-    operator_memory.assign(static_cast<std::size_t>(ModeSizes(m).operators), 0.);
+    for (auto* memory : {&operator_memory, &ledger_memory}) {
+        memory->assign(static_cast<std::size_t>(ModeSizes(m).operators), 0.);
+    }
 }
 
 }  // namespace detail
@@ -61,7 +63,7 @@ void Scratch::fill_with_nan() noexcept {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     detail::ScratchData& s = *data_;
     for (auto* numbers : {&s.buffer, &s.vector_a, &s.vector_b, &s.vector_c, &s.torque_copy, &s.heat,
-                          &s.workspace, &s.operator_memory}) {
+                          &s.workspace, &s.operator_memory, &s.ledger_memory}) {
         std::fill(numbers->begin(), numbers->end(), nan);
     }
     for (detail::PairLoad& load : s.loads) {

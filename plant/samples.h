@@ -80,7 +80,7 @@ struct ScratchData {
     double viscosity = 0, oil_temperature = 0;
     std::vector<double> workspace;   // of the mode builder
     std::vector<int> workspace_index;
-    std::vector<double> operator_memory;
+    std::vector<double> operator_memory, ledger_memory;  // operators of a partial step, of a part of one
     const Mode* begin_groups = nullptr;  // mode in which the tree's begin.groups hold for `begin`
     double torque_residual = 0;          // of the tree's internal torques at `end`
     StepOperators used;              // by the last advance

@@ -49,7 +49,7 @@ double norm1(const double* a, int n, int stride) {
 
 }  // namespace
 
-void build_step_operators(const ModelData& m, const Mode& mode, double length, StepOperators& operators,
+int build_step_operators(const ModelData& m, const Mode& mode, double length, StepOperators& operators,
                           double* workspace) SHIFTRIG_REALTIME {
     operators.length = length;
     const int n = m.states, stride = m.states_padded, size = stride * n;
@@ -177,6 +177,7 @@ void build_step_operators(const ModelData& m, const Mode& mode, double length, S
         for (int i = 0; i < n; ++i) product[i] = length * (4 * c[i] - b[i]);
         put(operators.combined, 3 * m.forces, 2 * m.forces + k, product);
     }
+    return doublings;
 }
 
 }  // namespace shiftrig::plant::detail
