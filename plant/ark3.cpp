@@ -69,9 +69,7 @@ void write_state(const ModelData& m, const TreeMode& t, const GroupState& s, dou
     for (int p = 0; p < m.masses; ++p)
         z[topology.mass[static_cast<std::size_t>(p)]] = t.ratio[p] * s.speed[t.group[p]];
     for (int g = 0; g < t.paths.groups; ++g) {
-        const int p = t.first[g];
-        const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
-        if (edge.shaft >= 0) z[m.masses + edge.shaft] = edge.sign * t.ratio[p] * s.twist[g];
+        if (t.twist_factor[g] != 0) z[t.twist_slot[g]] = t.twist_back[g] * s.twist[g];
     }
 }
 
@@ -96,7 +94,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
 
     if (s.begin_groups != &mode) {
         read_groups(m, t, begin.z, v.begin);
-        group_forces(m, t, begin.f, v.begin.force);
+        group_forces(t, begin.f, v.begin.force);
     }
     for (int g = 0; g < t.paths.groups; ++g) v.momentum[g] = t.mass[g] * v.begin.speed[g];
     std::copy(begin.auxiliary_rate, begin.auxiliary_rate + m.auxiliary, v.auxiliary[0]);
@@ -124,7 +122,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
         }
         show_speeds(t, v.stage_speed, stage.z);
         evaluate_forces(w, w.contact, stage, Extent::moving_pairs);
-        group_forces(m, t, stage.f, v.stage_force[i - 1]);
+        group_forces(t, stage.f, v.stage_force[i - 1]);
         std::copy(stage.auxiliary_rate, stage.auxiliary_rate + m.auxiliary, v.auxiliary[i]);
         sums.torque[i] = v.stage_torque[i - 1];
         sums.force[i] = v.stage_force[i - 1];
@@ -151,7 +149,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     write_state(m, t, v.end, end.z);
     end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
     evaluate_forces(w, w.contact, end);
-    group_forces(m, t, end.f, v.end.force);
+    group_forces(t, end.f, v.end.force);
     s.torque_residual = rigid_torques(w, mode, v.end, end);
     const double middle = 0.5 * (from + end_fraction);
     s.half.at = {w.start + middle * w.h, middle, Side::right};
@@ -165,7 +163,7 @@ double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     TreeWork v(m, s.workspace.data());
     if (s.begin_groups != &mode) {
         read_groups(m, t, s.begin.z, v.begin);
-        group_forces(m, t, s.begin.f, v.begin.force);
+        group_forces(t, s.begin.f, v.begin.force);
     }
     const double h = s.end.at.time - s.begin.at.time;
     const MiddleSums sums{h,
@@ -196,7 +194,7 @@ double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         }
         m.tree->kernel.shaft_torques(t.paths, v.other.speed, v.other.twist, v.other.rate, v.other.passed,
                                      v.other.torque);
-        group_forces(m, t, s.middle.f, v.other.force);
+        group_forces(t, s.middle.f, v.other.force);
         rigid_torques(w, mode, v.other, s.middle);
     }
     return loss;

@@ -192,6 +192,8 @@ void build_sizes(ModelData& m) {
     m.contact_bytes = m.pairs + m.meshes;
     m.auxiliary = static_cast<int>(m.description.tyres.size() + 2 * m.description.engines.size());
     for (double inertia : s.inertia) m.root_inertia.push_back(std::sqrt(inertia));
+    for (double inertia : s.inertia) m.energy_factor.push_back(0.5 * inertia);
+    for (const Elastic& shaft : s.shafts) m.energy_factor.push_back(0.5 * shaft.stiffness);
     for (int j = 0; j < m.masses; ++j) {
         if (m.description.masses[static_cast<std::size_t>(j)].motion == Motion::translating) m.translating.push_back(j);
     }

@@ -87,6 +87,7 @@ struct ModelData {
     std::vector<int> bearing_force;       // per mesh, −1: none
     std::vector<int> external_force;      // per mass, −1: none
     std::vector<double> root_inertia;     // √J
+    std::vector<double> energy_factor;    // by state: J/2, then k/2
     std::vector<int> translating;         // masses
     std::unique_ptr<TreeTopology> tree;   // of the engine for long chains; none: dense modes
 

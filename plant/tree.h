@@ -51,8 +51,9 @@ struct TreeTopology {
     std::vector<Ground> grounds;         // brakes and resistances
     std::vector<double> ground_damping;  // by position [Nm s/rad]
     std::vector<double> weight;          // by unknown: share of a torque that is not unique
-    std::vector<unsigned char> read_by_laws;  // by position: its speed is read by engines, tyres, … or it translates
-    bool lossy = false;                       // any gear with losses
+    std::vector<unsigned char>
+        read_by_laws;    // by position: its speed is read by engines, tyres, … or it translates
+    bool lossy = false;  // any gear with losses
     TreeKernel kernel;
 };
 
@@ -76,6 +77,7 @@ struct TreeMode {
     // By group:
     int* first = nullptr;   // its first position: where it hangs on its parent
     int* parent = nullptr;  // group, −1: none
+    int* up = nullptr;
     int* path_begin = nullptr;
     int* path_parent = nullptr;
     unsigned char* grounded = nullptr;  // 1: held by a closed pair, 2: by a stuck mesh
@@ -88,6 +90,17 @@ struct TreeMode {
     double* drag_loss = nullptr;        // power lost to the housing per q²
     double* inverse = nullptr;          // 1/D and L of the stage matrix for the model's step size
     double* lower = nullptr;
+    // q = factor · z[slot], ψ = factor · z[slot]; without a shaft the factor is 0. Back: z = q or ψ over the factor.
+    int* speed_slot = nullptr;
+    int* twist_slot = nullptr;
+    double* speed_factor = nullptr;
+    double* twist_factor = nullptr;
+    double* twist_back = nullptr;  // 1/twist_factor
+    // Forces that can be other than 0 (not those of locked pairs), and what they do to one or two groups.
+    int force_count = 0;
+    int* force = nullptr;
+    int* force_group = nullptr;      // two each
+    double* force_factor = nullptr;  // two each, 0 where there is only one
     // What the force laws read while a step is under way.
     int observed_count = 0;
     TreeMass* observed = nullptr;
@@ -152,10 +165,9 @@ struct TreeWork {
 // From a sample's z to q, ψ and all that follows from them; from its f to Q.
 void read_groups(const ModelData& model, const TreeMode& tree, const double* z,
                  GroupState& groups) SHIFTRIG_REALTIME;
-void group_forces(const ModelData& model, const TreeMode& tree, const double* f,
-                  double* force) SHIFTRIG_REALTIME;
+void group_forces(const TreeMode& tree, const double* f, double* force) SHIFTRIG_REALTIME;
 
-// Internal torques of the sample from its group state; returns their residual relative to the largest load.
+// Internal torques of the sample from its group state; returns their residual relative to the largest torque.
 double rigid_torques(const Work& work, const Mode& mode, const GroupState& groups,
                      Sample& sample) SHIFTRIG_REALTIME;
 

@@ -14,6 +14,8 @@ struct TreePaths {
     int count = 0;                // paths
     const int* begin = nullptr;   // of each path, and `groups` at the end
     const int* parent = nullptr;  // group that the head hangs on, −1: none
+    const int* up = nullptr;      // parent of every group; roots, with L = 0, name group 0
+    bool long_paths = false;      // worth following; short ones run into each other by themselves
     const double* mass = nullptr;
     const double* inverse_mass = nullptr;  // 0 where grounded
     const double* drag = nullptr;

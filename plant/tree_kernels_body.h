@@ -16,7 +16,8 @@ inline void move_heads(const TreePaths& t, const double* __restrict passed, doub
 
 inline void differences(const TreePaths& t, const double* __restrict speed,
                         double* __restrict rate) noexcept {
-    for (int g = 0; g < t.groups; ++g) rate[g] = speed[g] - speed[g - 1];
+    const int groups = t.groups;
+    for (int g = 0; g < groups; ++g) rate[g] = speed[g] - speed[g - 1];
     for (int p = 0; p < t.count; ++p) {
         const int head = t.begin[p];
         rate[head] = t.parent[p] < 0 ? 0 : speed[head] - speed[t.parent[p]];
@@ -42,22 +43,41 @@ template <int count>
 void stage_start(const TreePaths& t, const StageSums& s, const double* __restrict momentum,
                  const double* __restrict twist, double weight, double* __restrict star_momentum,
                  double* __restrict star_twist, double* __restrict passed) noexcept {
-    for (int g = 0; g < t.groups; ++g) {
-        double p = momentum[g], psi = twist[g];
-        for (int j = 0; j < count; ++j) {
-            p = SHIFTRIG_FMA(s.implicit_weight[j], s.torque[j][g], p);
-            p = SHIFTRIG_FMA(s.explicit_weight[j], s.force[j][g], p);
-            psi = SHIFTRIG_FMA(s.implicit_weight[j], s.rate[j][g], psi);
+    constexpr int b = count > 1 ? 1 : 0,
+                  c = count > 2 ? 2 : 0;  // where there are fewer terms the last ones are unused
+    const double* __restrict n0 = s.torque[0], * __restrict q0 = s.force[0], * __restrict d0 = s.rate[0];
+    const double* __restrict n1 = s.torque[b], * __restrict q1 = s.force[b], * __restrict d1 = s.rate[b];
+    const double* __restrict n2 = s.torque[c], * __restrict q2 = s.force[c], * __restrict d2 = s.rate[c];
+    const double i0 = s.implicit_weight[0], e0 = s.explicit_weight[0], i1 = s.implicit_weight[b],
+                 e1 = s.explicit_weight[b], i2 = s.implicit_weight[c], e2 = s.explicit_weight[c];
+    const double* __restrict stiffness = t.stiffness;
+    const int groups = t.groups;
+    for (int g = 0; g < groups; ++g) {
+        double p = SHIFTRIG_FMA(e0, q0[g], SHIFTRIG_FMA(i0, n0[g], momentum[g]));
+        double psi = SHIFTRIG_FMA(i0, d0[g], twist[g]);
+        if constexpr (count > 1) {
+            p = SHIFTRIG_FMA(e1, q1[g], SHIFTRIG_FMA(i1, n1[g], p));
+            psi = SHIFTRIG_FMA(i1, d1[g], psi);
+        }
+        if constexpr (count > 2) {
+            p = SHIFTRIG_FMA(e2, q2[g], SHIFTRIG_FMA(i2, n2[g], p));
+            psi = SHIFTRIG_FMA(i2, d2[g], psi);
         }
         star_momentum[g] = p;
         star_twist[g] = psi;
-        passed[g] = weight * t.stiffness[g] * psi;
+        passed[g] = weight * stiffness[g] * psi;
     }
 }
 
 // Leaves towards roots: b of the parent += L b. Two neighbouring paths run side by side, since each is a chain of
 // dependent operations: the later one must be done before the earlier one passes the group it hangs on.
 inline void eliminate(const TreePaths& t, const double* __restrict lower, double* __restrict right) noexcept {
+    if (!t.long_paths) {
+        for (int g = t.groups - 1; g > 0; --g) {
+            right[t.up[g]] = SHIFTRIG_FMA(lower[g], right[g], right[t.up[g]]);
+        }
+        return;
+    }
     int p = t.count - 1;
     while (p >= 0) {
         const int b_begin = t.begin[p], b_end = t.begin[p + 1];
@@ -101,6 +121,10 @@ inline void eliminate(const TreePaths& t, const double* __restrict lower, double
 // Roots towards leaves: q = b/D + L q of the parent; `speed` comes in as b/D.
 inline void substitute(const TreePaths& t, const double* __restrict lower,
                        double* __restrict speed) noexcept {
+    if (!t.long_paths) {
+        for (int g = 1; g < t.groups; ++g) speed[g] = SHIFTRIG_FMA(lower[g], speed[t.up[g]], speed[g]);
+        return;
+    }
     int p = 0;
     const auto head = [&](int path) {
         const int g = t.begin[path], up = t.parent[path];
@@ -150,29 +174,36 @@ void stage(const TreePaths& t, const StageSums& s, const double* momentum, const
     work[t.groups] = 0;
     const double* __restrict passed = work;
     const double* __restrict star = star_momentum;
-    double* __restrict right = speed;
-    for (int g = 0; g < t.groups; ++g) right[g] = star[g] + (passed[g + 1] - passed[g]);
+    double* const right = speed;
+    const int groups = t.groups;
+    for (int g = 0; g < groups; ++g) right[g] = star[g] + (passed[g + 1] - passed[g]);
     move_heads(t, passed, right);
     eliminate(t, lower, speed);
-    for (int g = 0; g < t.groups; ++g) right[g] *= inverse[g];
+    const double* __restrict reciprocal = inverse;
+    for (int g = 0; g < groups; ++g) right[g] *= reciprocal[g];
     substitute(t, lower, speed);
     differences(t, speed, rate);
+
     const double inverse_weight = 1 / weight;
-    double* __restrict shaft = torque;
-    for (int g = 0; g < t.groups; ++g) shaft[g] = (t.mass[g] * right[g] - shaft[g]) * inverse_weight;
+    const double* __restrict mass = t.mass;
+    double* const shaft = torque;
+    for (int g = 0; g < groups; ++g) shaft[g] = (mass[g] * right[g] - shaft[g]) * inverse_weight;
 }
 
 void finish(const TreePaths& t, const FinalSums& s, double* speed, double* twist) noexcept {
     double* __restrict q = speed;
     double* __restrict psi = twist;
-    const double *f0 = s.force[0], *f1 = s.force[1], *f2 = s.force[2], *f3 = s.force[3];
-    for (int g = 0; g < t.groups; ++g) {
-        double impulse = s.correction[0] * f0[g];
-        impulse = SHIFTRIG_FMA(s.correction[1], f1[g], impulse);
-        impulse = SHIFTRIG_FMA(s.correction[2], f2[g], impulse);
-        impulse = SHIFTRIG_FMA(s.correction[3], f3[g], impulse);
-        q[g] = SHIFTRIG_FMA(t.inverse_mass[g], impulse, s.last_speed[g]);
-        psi[g] = SHIFTRIG_FMA(s.weight, s.last_rate[g], s.star_twist[g]);
+    const double* __restrict f0 = s.force[0], * __restrict f1 = s.force[1], * __restrict f2 = s.force[2], * __restrict f3 = s.force[3];
+    const double c0 = s.correction[0], c1 = s.correction[1], c2 = s.correction[2], c3 = s.correction[3];
+    const double* __restrict last_speed = s.last_speed, * __restrict last_rate = s.last_rate;
+    const double* __restrict star = s.star_twist, * __restrict inverse = t.inverse_mass;
+    const double weight = s.weight;
+    const int groups = t.groups;
+    for (int g = 0; g < groups; ++g) {
+        const double impulse =
+            SHIFTRIG_FMA(c3, f3[g], SHIFTRIG_FMA(c2, f2[g], SHIFTRIG_FMA(c1, f1[g], c0 * f0[g])));
+        q[g] = SHIFTRIG_FMA(inverse[g], impulse, last_speed[g]);
+        psi[g] = SHIFTRIG_FMA(weight, last_rate[g], star[g]);
     }
 }
 

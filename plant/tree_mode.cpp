@@ -12,8 +12,9 @@ namespace shiftrig::plant::detail {
 TreeSizes::TreeSizes(const ModelData& m) {
     const auto n = static_cast<std::size_t>(m.masses) + 1;
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
-    doubles = 17 * n + grounds;
-    integers = 10 * n + 2 * grounds;
+    const auto forces = static_cast<std::size_t>(m.forces);
+    doubles = 20 * n + grounds + 2 * forces;
+    integers = 13 * n + 2 * grounds + 3 * forces;
     bytes = (n + 7) / 8 * 8;
     masses = 2 * n;
 }
@@ -22,15 +23,17 @@ void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers,
                 TreeMass* masses) noexcept {
     const auto n = static_cast<std::size_t>(m.masses) + 1;
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
-    for (double** array : {&t.ratio, &t.force_ratio, &t.mass, &t.inverse_mass, &t.drag, &t.stiffness,
-                           &t.damping, &t.loss, &t.drag_loss, &t.inverse, &t.lower, &t.edge_own, &t.edge_up,
-                           &t.network_inverse, &t.network_lower}) {
+    for (double** array :
+         {&t.ratio, &t.force_ratio, &t.mass, &t.inverse_mass, &t.drag, &t.stiffness, &t.damping, &t.loss,
+          &t.drag_loss, &t.inverse, &t.lower, &t.edge_own, &t.edge_up, &t.network_inverse, &t.network_lower,
+          &t.speed_factor, &t.twist_factor, &t.twist_back}) {
         *array = doubles;
         doubles += n;
     }
     t.end_factor = doubles;  // two ends of every link
     t.ground_factor = t.end_factor + 2 * n;
-    for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent}) {
+    for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.speed_slot,
+                        &t.twist_slot, &t.up}) {
         *array = integers;
         integers += n;
     }
@@ -38,6 +41,9 @@ void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers,
     t.end_position = t.end_group + 2 * n;
     t.ground_position = t.end_position + 2 * n;
     t.ground_unknown = t.ground_position + grounds;
+    t.force = t.ground_unknown + grounds;
+    t.force_group = t.force + m.forces;
+    t.force_factor = t.ground_factor + grounds;
     t.grounded = bytes;
     t.observed = masses;
     t.inner = masses + n;
@@ -198,6 +204,9 @@ void find_paths(TreeMode& t) {
         t.path_parent[paths.count++] = t.parent[g];
     }
     t.path_begin[paths.count] = paths.groups;
+    for (int g = 0; g < paths.groups; ++g) t.up[g] = t.parent[g] < 0 ? 0 : t.parent[g];
+    paths.up = t.up;
+    paths.long_paths = paths.groups > 12 * paths.count;
     paths.begin = t.path_begin;
     paths.parent = t.path_parent;
     paths.mass = t.mass;
@@ -239,6 +248,15 @@ void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
         if (marks[p] & read) t.observed[t.observed_count++] = entry;
         if (marks[p] & rigid) t.inner[t.inner_count++] = entry;
     }
+    for (int g = 0; g < t.paths.groups; ++g) {
+        const int p = t.first[g];
+        const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
+        t.speed_slot[g] = topology.mass[static_cast<std::size_t>(p)];
+        t.speed_factor[g] = t.grounded[g] ? 0 : 1 / t.ratio[p];
+        t.twist_slot[g] = edge.shaft < 0 ? 0 : m.masses + edge.shaft;
+        t.twist_factor[g] = edge.shaft < 0 ? 0 : edge.sign / t.ratio[p];
+        t.twist_back[g] = edge.sign * t.ratio[p];
+    }
     const auto end = [&](int g, int position, double factor) {
         if (!(marks[position] & rigid)) return;
         t.end_group[t.end_count] = g;
@@ -250,6 +268,22 @@ void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
         const int p = t.first[g];
         end(g, p, -1 / t.force_ratio[p]);
         end(g, topology.edges[static_cast<std::size_t>(p)].parent, 1 / t.force_ratio[p]);
+    }
+}
+
+void find_forces(const ModelData& m, const Mode& mode, TreeMode& t) {
+    t.force_count = 0;
+    for (int k = 0; k < m.forces; ++k) {
+        if (k < m.pairs && mode.key[k]) continue;
+        int* group = t.force_group + 2 * t.force_count;
+        double* factor = t.force_factor + 2 * t.force_count;
+        for (std::size_t i = 0; i < 2; ++i) {
+            const Link& link = m.force_columns[static_cast<std::size_t>(k)][i];
+            const int p = link.mass < 0 ? 0 : m.tree->position[static_cast<std::size_t>(link.mass)];
+            group[i] = t.group[p];
+            factor[i] = link.mass < 0 ? 0 : t.force_ratio[p] * link.factor;
+        }
+        t.force[t.force_count++] = k;
     }
 }
 
@@ -267,6 +301,7 @@ void build_tree_mode(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     weigh_groups(m, mode, t);
     find_paths(t);
     find_masses(m, mode, t);
+    find_forces(m, mode, t);
     if (t.ground_count > 0) factor_network(m, t);
     factor_stage(t, ark3_gamma * m.options.step_size, t.inverse, t.lower);
 }

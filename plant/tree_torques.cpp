@@ -83,26 +83,17 @@ TreeWork::TreeWork(const ModelData& m, double* memory) noexcept {
 }
 
 void read_groups(const ModelData& m, const TreeMode& t, const double* z, GroupState& s) SHIFTRIG_REALTIME {
-    const TreeTopology& topology = *m.tree;
-    for (int g = 0; g < t.paths.groups; ++g) {
-        const int p = t.first[g];
-        const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
-        const double inverse = 1 / t.ratio[p];
-        s.speed[g] = t.grounded[g] ? 0 : z[topology.mass[static_cast<std::size_t>(p)]] * inverse;
-        s.twist[g] = edge.shaft < 0 ? 0 : edge.sign * z[m.masses + edge.shaft] * inverse;
-    }
-    topology.kernel.shaft_torques(t.paths, s.speed, s.twist, s.rate, s.passed, s.torque);
+    for (int g = 0; g < t.paths.groups; ++g) s.speed[g] = t.speed_factor[g] * z[t.speed_slot[g]];
+    for (int g = 0; g < t.paths.groups; ++g) s.twist[g] = t.twist_factor[g] * z[t.twist_slot[g]];
+    m.tree->kernel.shaft_torques(t.paths, s.speed, s.twist, s.rate, s.passed, s.torque);
 }
 
-void group_forces(const ModelData& m, const TreeMode& t, const double* f, double* force) SHIFTRIG_REALTIME {
+void group_forces(const TreeMode& t, const double* f, double* force) SHIFTRIG_REALTIME {
     std::fill(force, force + t.paths.groups, 0.);
-    for (int k = 0; k < m.forces; ++k) {
-        if (f[k] == 0) continue;
-        for (const Link& link : m.force_columns[static_cast<std::size_t>(k)]) {
-            if (link.mass < 0) continue;
-            const int p = m.tree->position[static_cast<std::size_t>(link.mass)];
-            force[t.group[p]] -= t.force_ratio[p] * link.factor * f[k];
-        }
+    for (int i = 0; i < t.force_count; ++i) {
+        const double value = f[t.force[i]];
+        force[t.force_group[2 * i]] -= t.force_factor[2 * i] * value;
+        force[t.force_group[2 * i + 1]] -= t.force_factor[2 * i + 1] * value;
     }
 }
 
@@ -121,7 +112,8 @@ double rigid_torques(const Work& w, const Mode& mode, const GroupState& groups, 
     }
     for (int i = 0; i < t.end_count; ++i)
         load[t.end_position[i]] += t.end_factor[i] * groups.passed[t.end_group[i]];
-    for (int k = 0; k < m.forces; ++k) {
+    for (int i = 0; t.inner_count > 0 && i < t.force_count; ++i) {
+        const int k = t.force[i];
         if (s.f[k] == 0) continue;
         for (const Link& link : m.force_columns[static_cast<std::size_t>(k)]) {
             if (link.mass >= 0)
@@ -161,7 +153,7 @@ void tree_internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_
     TreeWork work(m, scratch.workspace.data());
     GroupState& groups = &s == &scratch.begin ? work.begin : work.other;
     read_groups(m, *mode.tree, s.z, groups);
-    group_forces(m, *mode.tree, s.f, groups.force);
+    group_forces(*mode.tree, s.f, groups.force);
     const double residual = rigid_torques(w, mode, groups, s);
     if (&s == &scratch.begin) scratch.begin_groups = &mode;
     if (&s == &scratch.end) scratch.torque_residual = residual;
@@ -174,7 +166,7 @@ void tree_sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALT
     TreeWork work(m, w.scratch.workspace.data());
     GroupState& groups = work.other;
     read_groups(m, t, s.z, groups);
-    group_forces(m, t, s.f, groups.force);
+    group_forces(t, s.f, groups.force);
     for (int g = 0; g < t.paths.groups; ++g)
         groups.torque[g] = (groups.torque[g] + groups.force[g]) * t.inverse_mass[g];
     for (int p = 0; p < m.masses; ++p) {
