@@ -1,0 +1,7 @@
+# Counts calls of malloc, which the sanitizers want for themselves.
+if(NOT CMAKE_CXX_FLAGS MATCHES "fsanitize")
+  add_executable(realtime_test ${CMAKE_CURRENT_LIST_DIR}/realtime_test.cpp)
+  target_compile_definitions(realtime_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  target_link_libraries(realtime_test PRIVATE shiftrig_rig GTest::gtest_main)
+  gtest_discover_tests(realtime_test)
+endif()
