@@ -8,6 +8,7 @@
 
 #include "apps/shiftrig/command.h"
 #include "io/recording/csv.h"
+#include "io/recording/field.h"
 #include "io/recording/reader.h"
 #include "io/recording/rebuild.h"
 #include "io/recording/replay.h"
@@ -19,6 +20,9 @@ namespace {
 struct Options {
     std::string recording, model;
     double tolerance = 0;
+    // Of a field recording only.
+    std::vector<std::string> locked, options;
+    double step_s = 1e-3;
     bool json = false;
 };
 
@@ -113,7 +117,47 @@ int run_on(io::RecordingReader& reader, const Options& options) {
     return good;
 }
 
+// A real machine's data against the model: how well do they fit?
+int run_field(const Options& options) {
+    const io::FieldRecording recording = io::read_field_csv(options.recording);
+    if (options.model.empty()) throw io::InputError(options.recording + ": a field recording needs --model");
+    io::ModelFile file = io::read_model(options.model);
+    for (const auto& option : options.options) {
+        const auto equals = option.find('=');
+        if (equals == std::string::npos)
+            throw io::InputError("--option " + option + ": write GEAR=OPTION, as range=M");
+        io::select_option(file.description, option.substr(0, equals), option.substr(equals + 1));
+    }
+    plant::BuildOptions build;
+    build.step_size = options.step_s;
+    const io::FieldFit fit = io::replay_field(recording, io::build_model(file, build), options.locked);
+    if (options.json) {
+        nlohmann::json out{
+            {"driven", fit.driven}, {"ignored", fit.ignored}, {"fits", nlohmann::json::array()}};
+        for (const auto& f : fit.fits)
+            out["fits"].push_back({{"column", f.written},
+                                   {"unit", plant::symbol(f.unit)},
+                                   {"rms", f.rms},
+                                   {"worst", f.worst},
+                                   {"worst_time_s", f.worst_time},
+                                   {"simulated", f.simulated},
+                                   {"measured", f.measured}});
+        std::cout << out.dump(2) << '\n';
+        return good;
+    }
+    std::printf("%-40s %-6s %12s %12s %10s %14s %14s\n", "measured", "unit", "rms", "worst", "at [s]",
+                "simulated", "measured");
+    for (const auto& f : fit.fits)
+        std::printf("%-40s %-6s %12.5g %12.5g %10.4f %14.7g %14.7g\n", f.written.c_str(),
+                    std::string(plant::symbol(f.unit)).c_str(), f.rms, f.worst, f.worst_time, f.simulated,
+                    f.measured);
+    for (const auto& column : fit.ignored)
+        std::cerr << options.recording << ": column " << column << " is no signal of the model\n";
+    return good;
+}
+
 int run(const Options& options) {
+    if (options.recording.ends_with(".csv")) return run_field(options);
     io::RecordingReader reader(options.recording);
     try {
         return run_on(reader, options);
@@ -124,12 +168,20 @@ int run(const Options& options) {
 
 Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<Options>();
-    app.add_option("RECORDING", options->recording, "what `shiftrig run --record` wrote")->required();
+    app.add_option("RECORDING", options->recording,
+                   "what `shiftrig run --record` wrote, or a real machine's data (.csv)")
+        ->required();
     app.add_option("--tolerance", options->tolerance,
                    "agree where |replayed - recorded| <= tolerance * max(1, |recorded|); 0: bit for bit")
         ->check(CLI::NonNegativeNumber);
     app.add_option("--model", options->model,
                    "another model under the same inputs: what would it have done?");
+    auto* field = app.add_option_group("field recordings (.csv)");
+    field->add_option("--locked", options->locked, "devices locked at the start: Fc,F2")->delimiter(',');
+    field->add_option("--option", options->options, "gear option in use: range=M; repeatable");
+    field->add_option("--step", options->step_s, "step size of the plant [s]")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
     app.add_flag("--json", options->json, "print one JSON object");
     return [options] { return run(*options); };
 }

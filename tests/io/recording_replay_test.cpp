@@ -2,6 +2,7 @@
 
 #include "io/lcm/channels.h"
 #include "io/recording/csv.h"
+#include "io/recording/field.h"
 #include "io/recording/replay.h"
 #include "recorded_shift.h"
 
@@ -204,6 +205,67 @@ TEST(Replay, MachineOfAnotherStructureIsRefused) {
     const ModelFile other = read_model(SHIFTRIG_SOURCE_DIR "/config/two_mass.yaml");
     const plant::Model model = build_model(other);
     EXPECT_THROW(replay(reader, model), RecordingError);
+}
+
+// The plant's own run, written as a real machine's data would be: 100 Hz, bar and rpm. What is left is the sampling.
+TEST(FieldReplay, FitsTheMachineThatMadeTheData) {
+    TemporaryFile recording(".lcmlog"), field(".csv");
+    record_shift(recording.path);
+    RecordingReader reader(recording.path);
+    const Manifest& m = reader.manifest();
+    const auto value = [](const std::vector<plant::Signal>& signals, const std::vector<double>& values,
+                          const char* name) {
+        return values.at(static_cast<std::size_t>(index_of(signals, name)));
+    };
+    std::string text =
+        "time_s;driver.throttle;environment.draft;clutch.F2.pressure_command_bar;clutch.F3.pressure_command_"
+        "bar;"
+        "mass.engine.speed_rpm;mass.vehicle.speed_kmh;boost_bar\n";
+    for (RecordedTick tick; reader.next(tick);) {
+        if (tick.tick >= 190 || (tick.tick + 1) % 10 != 0)
+            continue;  // before the shift: no heat, no piston to know
+        const double cells[] = {1e-9 * static_cast<double>(tick.sim_time_ns),
+                                value(m.inputs, tick.inputs, "driver.throttle"),
+                                value(m.inputs, tick.inputs, "environment.draft"),
+                                1e-5 * value(m.inputs, tick.inputs, "clutch.F2.pressure_command"),
+                                1e-5 * value(m.inputs, tick.inputs, "clutch.F3.pressure_command"),
+                                30 / std::acos(-1.0) * value(m.outputs, tick.outputs, "mass.engine.speed"),
+                                3.6 * value(m.outputs, tick.outputs, "mass.vehicle.speed"),
+                                1.5};
+        for (const double cell : cells) text += std::to_string(cell) + (&cell == &cells[7] ? "\n" : ";");
+    }
+    write_file(field.path, text);
+    ModelFile file = recorded_model_file(m);
+    const plant::Model model = build_as_recorded(file, m);
+    const FieldFit fit = replay_field(read_field_csv(field.path), model, {"Fc", "F2"});
+    ASSERT_EQ(fit.fits.size(), 2u);
+    EXPECT_EQ(fit.fits[0].written, "mass.engine.speed_rpm");
+    EXPECT_EQ(fit.fits[0].unit, plant::Unit::radian_per_second);
+    EXPECT_GT(fit.fits[0].rms, 0);
+    EXPECT_LE(fit.fits[0].rms, fit.fits[0].worst);
+    // Twists and turbo are not in the data, so the engine starts some rad/s off and comes back.
+    EXPECT_LT(fit.fits[0].worst, 10);
+    EXPECT_LT(fit.fits[1].worst, 0.2);
+    EXPECT_EQ(fit.driven.size(), 4u);
+    EXPECT_EQ(fit.ignored, std::vector<std::string>{"boost_bar"});
+}
+
+TEST(FieldReplay, WrongDataIsNamedWithItsLine) {
+    TemporaryFile field(".csv");
+    const auto error = [&](const std::string& text) {
+        write_file(field.path, text);
+        try {
+            read_field_csv(field.path);
+        } catch (const InputError& e) {
+            return std::string(e.what()).substr(field.path.size());
+        }
+        return std::string("(no error)");
+    };
+    EXPECT_EQ(error("t,a\n"), ":1:1: the first column is \"t\"; must be time_s");
+    EXPECT_EQ(error("time_s,a\n0,1\n0.1\n"), ":3: 1 values; the header has 2");
+    EXPECT_EQ(error("time_s,a\n0,1\n0.1,x\n"), ":3: a = \"x\"; must be a number");
+    EXPECT_EQ(error("time_s,a\n0,1\n0,1\n"), ":3:1: time_s = 0; must be later than the row before");
+    EXPECT_EQ(error("time_s,a\n0,1\n"), ": has fewer than two rows");
 }
 
 TEST(Csv, NumbersReadBackToTheBit) {

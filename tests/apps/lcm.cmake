@@ -1,0 +1,3 @@
+# The rig and its tools on LCM, as a user starts them.
+add_test(NAME lcm_test COMMAND ${CMAKE_SOURCE_DIR}/tests/io/with_multicast.sh /usr/bin/python3
+  ${CMAKE_CURRENT_LIST_DIR}/lcm_test.py $<TARGET_FILE:shiftrig> $<TARGET_FILE:shiftrig-tcu> ${CMAKE_SOURCE_DIR})

@@ -1,0 +1,184 @@
+"""The rig on LCM: a controller in a second process, in lockstep and by the clock; LCM's own tools beside it; a
+controller in plain Python.
+
+usage: lcm_test.py SHIFTRIG SHIFTRIG_TCU SOURCE_FOLDER [TEST]...      (inside tests/io/with_multicast.sh)
+"""
+import csv
+import importlib
+import os
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+sys.dont_write_bytecode = True
+RIG, TCU, SOURCE = sys.argv[1:4]
+sys.path.insert(0, SOURCE + "/apps/examples")
+from lcm_udpm import Types  # noqa: E402
+
+BUS = "lcm:udpm://239.255.76.67:7667?ttl=0"
+URL = BUS[4:]
+SCENARIO = SOURCE + "/config/scenarios/plough_upshift.yaml"
+TYPES = Types(SOURCE + "/lcmtypes")
+
+
+def events(path):
+    """(channel, time, data) of every event of an LCM log."""
+    with open(path, "rb") as file:
+        while header := file.read(28):
+            sync, _, when, channel, length = struct.unpack(">IqqII", header)
+            assert sync == 0xEDA1DA01
+            yield file.read(channel).decode(), when, file.read(length)
+
+
+def write_log(path, selected):
+    with open(path, "wb") as file:
+        for number, (channel, when, data) in enumerate(selected):
+            file.write(struct.pack(">IqqII", 0xEDA1DA01, number, when, len(channel), len(data)) + channel.encode() + data)
+
+
+def records(path):
+    """What a run recorded, tick by tick, without the opening records."""
+    return [(channel, data) for channel, _, data in events(path)
+            if channel != "SHIFTRIG_REC_CHUNK" or TYPES["record_chunk_t"].decode(data)["kind"] == 4]
+
+
+class Beside:
+    """A program beside the rig, ended by SIGINT."""
+
+    def __init__(self, *command):
+        self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        assert self.process.poll() is None, "%s ended by itself" % self.process.args[0]
+        self.process.send_signal(signal.SIGINT)
+        try:
+            self.process.wait(20)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+class OnLcm(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def run_rig(self, recording, *arguments):
+        done = subprocess.run([RIG, "run", "--scenario", SCENARIO, "--controller", "none", "--bus", BUS, "--record",
+                               recording, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=500)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def lockstep_run(self, name, *controller):
+        with Beside(*controller):
+            self.run_rig(self.path(name), "--pace", "lockstep", "--answer-timeout", "60")
+        return self.path(name)
+
+    def explained(self, recording):
+        return subprocess.run([RIG, "explain", recording], stdout=subprocess.PIPE, text=True, check=True).stdout
+
+    def replays(self, recording):
+        done = subprocess.run([RIG, "replay", recording], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout)
+
+    def test_two_lockstep_runs_give_the_same_records_to_the_byte(self):
+        first = self.lockstep_run("first.lcmlog", TCU, "--bus", BUS, "--lockstep")
+        second = self.lockstep_run("second.lcmlog", TCU, "--bus", BUS, "--lockstep")
+        a, b = records(first), records(second)
+        self.assertGreater(len(a), 6000)
+        for (channel, one), (_, other) in zip(a, b):
+            self.assertEqual(one, other, channel)
+        self.assertEqual(len(a), len(b))
+        self.assertIn("F3 locks", self.explained(first))
+        self.replays(first)
+
+    def test_logger_beside_the_rig_captures_what_its_recording_holds(self):
+        wire, recording = self.path("wire.log"), self.path("run.lcmlog")
+        with Beside("lcm-logger", "-q", "--lcm-url=" + URL, wire):
+            time.sleep(1)
+            self.lockstep_run("run.lcmlog", TCU, "--bus", BUS, "--lockstep")
+            time.sleep(0.5)
+        subprocess.run([RIG, "export", recording, "--csv", self.path("run.csv")], check=True, stderr=subprocess.DEVNULL)
+        with open(self.path("run.csv"), newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        seen = {channel: [TYPES[kind].decode(data) for name, _, data in events(wire) if name == channel]
+                for channel, kind in (("SHIFTRIG_SPEEDS", "speeds_t"), ("SHIFTRIG_CLUTCH_COMMAND", "clutch_command_t"),
+                                      ("SHIFTRIG_PLANT_INFO", "plant_info_t"))}
+        def names(field):
+            return [bytes(n).split(b"\0")[0].decode() for n in seen["SHIFTRIG_PLANT_INFO"][0][field]]
+        speeds = {m["tick"]: m for m in seen["SHIFTRIG_SPEEDS"]}
+        self.assertGreater(len(speeds), 500)  # a busy machine lets the logger lose many of a burst
+        sensors, clutches = names("sensor_name"), names("clutch_name")
+        for tick, message in speeds.items():
+            row = rows[tick - 1]
+            for i in range(message["sensor_count"]):
+                self.assertEqual(message["speed"][i], float(row["sensor.%s.speed_rad_s" % sensors[i]]), (tick, sensors[i]))
+        asked = {m["seq"]: m["tick"] for m in seen["SHIFTRIG_SPEEDS"]}
+        compared = 0
+        for command in seen["SHIFTRIG_CLUTCH_COMMAND"]:
+            tick = asked.get(command["answers_seq"])
+            if tick is None or tick >= len(rows):
+                continue
+            row = rows[tick]  # the tick after the question
+            for i, clutch in enumerate(clutches[:command["clutch_count"]]):
+                column = "clutch.%s.pressure_command_pa" % clutch
+                if command["enable"][i] and column in row:
+                    self.assertEqual(command["pressure_pa"][i], float(row[column]), (tick, clutch))
+                    compared += 1
+        self.assertGreater(compared, 500)
+
+    def test_player_feeding_recorded_commands_reproduces_the_shift(self):
+        # Recorded by the clock, played by the clock.
+        wire, commands = self.path("wire.log"), self.path("commands.log")
+        with Beside("lcm-logger", "-q", "--lcm-url=" + URL, wire):
+            time.sleep(1)
+            with Beside(TCU, "--bus", BUS):
+                self.run_rig(self.path("live.lcmlog"), "--pace", "wall", "--duration", "4")
+        self.assertIn("F3 locks", self.explained(self.path("live.lcmlog")))
+        self.replays(self.path("live.lcmlog"))
+        start = min(when for channel, when, data in events(wire) if channel == "SHIFTRIG_SPEEDS")
+        write_log(commands, [e for e in events(wire) if e[0] == "SHIFTRIG_CLUTCH_COMMAND" and e[1] >= start])
+        rig = subprocess.Popen([RIG, "run", "--scenario", SCENARIO, "--controller", "none", "--bus", BUS, "--pace", "wall",
+                                "--duration", "4", "--record", self.path("played.lcmlog")],
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        subprocess.run(["lcm-logplayer", "--lcm-url=" + URL, commands], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=200)
+        self.assertEqual(rig.wait(200), 0)
+        self.assertIn("F3 locks", self.explained(self.path("played.lcmlog")))
+
+    def test_controller_in_plain_python_shifts_the_tractor(self):
+        recording = self.lockstep_run("python.lcmlog", sys.executable, SOURCE + "/apps/examples/lcm_controller.py")
+        self.assertIn("F3 locks", self.explained(recording))
+
+    def test_missing_route_is_one_line(self):
+        done = subprocess.run([RIG, "run", "--scenario", SCENARIO, "--controller", "none", "--bus",
+                               "lcm:udpm://239.255.99.99:7667?ttl=0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, 2)
+        self.assertEqual(done.stderr, "lcm:udpm://239.255.99.99:7667?ttl=0: no route for multicast; run: sudo ip link set lo "
+                                      "multicast on && sudo ip route add 239.255.99.99/32 dev lo\n")
+
+
+class Types_(unittest.TestCase):
+    def test_lcm_gen_makes_every_language_and_agrees_on_the_fingerprints(self):
+        with tempfile.TemporaryDirectory() as folder:
+            sources = sorted(os.path.join(SOURCE, "lcmtypes", name) for name in os.listdir(SOURCE + "/lcmtypes") if name.endswith(".lcm"))
+            for language in (["-c", "--c-cpath", folder, "--c-hpath", folder], ["-x", "--cpp-hpath", folder],
+                             ["-j", "--jpath", folder], ["-l", "--lpath", folder], ["-p", "--ppath", folder]):
+                subprocess.run(["lcm-gen", *language, *sources], check=True)
+            sys.path.insert(0, folder)
+            for name, kind in TYPES.items():
+                generated = getattr(importlib.import_module("shiftrig." + name), name)
+                self.assertEqual(generated._get_packed_fingerprint(), kind.fingerprint, name)
+            self.assertEqual(len(TYPES), len(sources))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=2)

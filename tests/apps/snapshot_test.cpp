@@ -1,0 +1,158 @@
+#include "apps/rig/snapshot.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstring>
+
+#include "apps/rig/fork.h"
+#include "io/recording/snapshot.h"
+#include "recorded_rig.h"
+#include "tests/io/synthetic_recording.h"
+
+namespace shiftrig::rig {
+namespace {
+
+using io::synthetic::TemporaryFile;
+
+bool is_bookkeeping(const std::string& name) {
+    return name.starts_with("certificate.mode_");
+}
+
+// plough_upshift up to `at`, written as a snapshot.
+void write_snapshot_at(const std::string& path, double at) {
+    Rig rig(setup_for("plough_upshift"));
+    SnapshotTaker taker(rig, at);
+    rt::LoopSettings loop;
+    loop.pace = rt::Pace::free;
+    Collector collector(rig, 3000);
+    while (!taker.taken()) {
+        rig.tick();
+        collector.take(rig);
+        taker.offer(rig);
+    }
+    taker.write(path, rig, loop, collector.finish(rig));
+}
+
+class Continued : public testing::TestWithParam<double> {};
+
+TEST_P(Continued, RunEqualsTheUninterruptedOneBitForBit) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, GetParam());
+    const io::Manifest snapshot = io::read_snapshot(file.path);
+    Rig continued(setup_of(snapshot)), whole(setup_for("plough_upshift"));
+    resume(continued, snapshot);
+    while (whole.ticks() < continued.ticks()) whole.tick();
+    for (int tick = 0; tick < 2000; ++tick) {
+        whole.tick();
+        continued.tick();
+        const auto a = values_of(whole), b = values_of(continued);
+        ASSERT_EQ(a.size(), b.size());
+        for (std::size_t i = 0; i < a.size(); ++i) {
+            const auto& name = whole.signals().signal(static_cast<int>(i)).name;
+            ASSERT_TRUE(std::memcmp(&a[i], &b[i], sizeof(double)) == 0 || is_bookkeeping(name))
+                << name << " " << tick << " ticks after the snapshot";
+        }
+        ASSERT_EQ(whole.plant_events().size(), continued.plant_events().size());
+    }
+}
+
+// Before, in the fill, in the torque phase and in the inertia phase of the shift.
+INSTANTIATE_TEST_SUITE_P(Times, Continued, testing::Values(1.0, 2.1, 2.2, 2.32));
+
+TEST(Snapshot, OfAnotherMachineIsRefused) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 0.5);
+    const io::Manifest snapshot = io::read_snapshot(file.path);
+    Rig other(setup_for("article_fig11_good"));
+    EXPECT_THROW(resume(other, snapshot), io::InputError);
+}
+
+TEST(Snapshot, RecordingIsNoSnapshot) {
+    TemporaryFile file(".lcmlog");
+    io::synthetic::write(file.path, 3);
+    try {
+        io::read_snapshot(file.path);
+        FAIL();
+    } catch (const io::RecordingError& error) {
+        EXPECT_EQ(
+            error.what(),
+            file.path + ": is a recording, not a snapshot; `shiftrig run --snapshot-at T FILE` makes one");
+    }
+}
+
+std::vector<Branch> forked(const std::string& path, const std::vector<std::string>& vary, int threads,
+                           std::int64_t branches = 12) {
+    std::vector<Variation> variations;
+    for (const auto& text : vary) variations.push_back(parse_variation(text));
+    ForkOptions options;
+    options.threads = threads;
+    std::atomic<std::int64_t> done{0};
+    const Plan plan(std::move(variations), branches, 5);
+    return fork(io::read_snapshot(path), plan, options, done);
+}
+
+TEST(Fork, RankingIsTheSameWhateverTheThreads) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 2.14);
+    const std::vector<std::string> vary = {"calibration.shift.inertia_time_s=0.15:0.4",
+                                           "environment.mobility_number=40:60"};
+    const auto one = forked(file.path, vary, 1), three = forked(file.path, vary, 3);
+    ASSERT_EQ(one.size(), 12u);
+    for (std::size_t i = 0; i < one.size(); ++i) {
+        EXPECT_EQ(one[i].number, three[i].number) << "rank " << i + 1;
+        EXPECT_EQ(one[i].burden, three[i].burden);
+        EXPECT_TRUE(one[i].completed);
+    }
+    EXPECT_LT(one.front().burden, one.back().burden);
+}
+
+TEST(Fork, LeakingClutchRanksBehindASoundOne) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 2.14);
+    const auto branches = forked(file.path, {"clutch.F3.leak=0.5,0"}, 2);
+    ASSERT_EQ(branches.size(), 2u);
+    EXPECT_EQ(branches[0].values[0], 0);
+    EXPECT_GT(branches[1].burden, branches[0].burden);
+}
+
+TEST(Fork, ModelParametersAreVariedRelativeToWhatTheyAre) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 2.14);
+    const auto branches = forked(file.path, {"model.masses.vehicle.mass_kg=+-10%"}, 2, 3);
+    ASSERT_EQ(branches.size(), 3u);
+    for (const auto& branch : branches) {
+        EXPECT_EQ(branch.error, "");
+        EXPECT_GE(branch.values[0], 0.9);
+        EXPECT_LE(branch.values[0], 1.1);
+    }
+    EXPECT_NE(branches[0].burden, branches[1].burden);
+}
+
+TEST(Fork, UnknownNameIsToldWithItsNeighbours) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 0.1);
+    try {
+        forked(file.path, {"clutch.F3.leek=0,1"}, 1);
+        FAIL();
+    } catch (const io::InputError& error) {
+        EXPECT_TRUE(std::string(error.what())
+                        .starts_with("--vary clutch.F3.leek: no such signal, or without its unit's suffix; "
+                                     "near: clutch.F3.leak"))
+            << error.what();
+    }
+}
+
+TEST(Variation, IsReadAsWritten) {
+    EXPECT_EQ(parse_variation("clutch.F3.leak=0,0.5").values, (std::vector<double>{0, 0.5}));
+    EXPECT_EQ(parse_variation("calibration.a.b=1:2:3").values, (std::vector<double>{1, 1.5, 2}));
+    const auto around = parse_variation("model.x=+-10%");
+    EXPECT_TRUE(around.relative && around.values.empty());
+    EXPECT_DOUBLE_EQ(around.low, 0.9);
+    EXPECT_DOUBLE_EQ(around.high, 1.1);
+    EXPECT_THROW(parse_variation("clutch.F3.leak"), io::InputError);
+    EXPECT_THROW(parse_variation("clutch.F3.leak=a"), io::InputError);
+}
+
+}  // namespace
+}  // namespace shiftrig::rig
