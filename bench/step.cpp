@@ -1,0 +1,116 @@
+// ns per complete step (inputs, valves, forces, stages, internal torques, checks, ledger, outputs, certificate)
+// of the machines in config/, locked and shifting, on each kernel this processor has; the bare products of
+// the method beside it, so that a busy machine can be told from a slow program.
+#include <benchmark/benchmark.h>
+
+#include <string>
+#include <vector>
+
+#include "io/model_file.h"
+#include "plant/kernels.h"
+#include "plant/plant.h"
+
+namespace shiftrig::plant {
+namespace {
+
+struct Machine {
+    Machine(const std::string& file, KernelKind kernel)
+        : model(Model::build(io::read_model(std::string(SHIFTRIG_CONFIG "/") + file).description, {1e-3, kernel})),
+          operators(model), state(model), scratch(model), inputs(model), outputs(model) {}
+    void set(const std::string& name, double value) {
+        const int index = model.input(name);
+        if (index >= 0) inputs.value[static_cast<std::size_t>(index)] = value;
+    }
+    void step() { plant::step(model, operators, state, inputs, outputs, scratch); }
+
+    Model model;
+    Operators operators;
+    State state;
+    Scratch scratch;
+    Inputs inputs;
+    Outputs outputs;
+};
+
+// Steps from a snapshot, `steps` at a time, so that every repetition does the same work.
+void repeat(benchmark::State& bench, Machine& machine, int steps) {
+    const std::vector<std::byte> snapshot(machine.state.bytes().begin(), machine.state.bytes().end());
+    long events = 0;
+    while (bench.KeepRunningBatch(steps)) {  // the time reported is that of one step
+        machine.state.restore(snapshot);
+        for (int n = 0; n < steps; ++n) {
+            machine.step();
+            events += machine.outputs.certificate.events;
+        }
+    }
+    bench.counters["events_per_step"] = static_cast<double>(events) / static_cast<double>(bench.iterations());
+    bench.SetLabel(std::string(machine.model.kernel()));
+}
+
+void two_mass(benchmark::State& bench, KernelKind kernel) {
+    Machine machine("two_mass.yaml", kernel);
+    repeat(bench, machine, 1000);
+}
+
+// Ploughing in F2; with `shifting`, F2 and F3 slip against each other all the time.
+void tractor(benchmark::State& bench, const std::string& file, KernelKind kernel, bool shifting) {
+    Machine machine(file, kernel);
+    machine.set("driver.throttle", 0.73);
+    machine.set("environment.draft", 1);
+    machine.set("clutch.F2.pressure_command", 18e5);
+    start(machine.model, machine.state, {{"Fc", "F2"}, {{"engine", 188.6}}}, machine.inputs);
+    for (int n = 0; n < 3000; ++n) machine.step();
+    if (shifting) {
+        machine.set("clutch.F2.pressure_command", 4e5);
+        machine.set("clutch.F3.pressure_command", 6e5);
+        for (int n = 0; n < 250; ++n) machine.step();
+    }
+    repeat(bench, machine, shifting ? 50 : 1000);
+}
+
+// The products of one exponential step for n states, m forces and r active rows (numerics: [P_h Q_h], P, Q_1,
+// the three combined, R).
+void bare_products(benchmark::State& bench, KernelKind kind) {
+    const detail::Kernel kernel = detail::choose_kernel(kind);
+    const int n = 17, m = 13, r = 9, rows = detail::padded(n);
+    std::vector<double> panel(static_cast<std::size_t>(detail::panel_size(n, 3 * (n + m))), 0.01), v(64, 1.), y(64), z(64);
+    for (auto _ : bench) {
+        kernel.multiply(panel.data(), rows, n + m, v.data(), nullptr, y.data());
+        kernel.multiply(panel.data(), rows, n, v.data(), nullptr, z.data());
+        kernel.multiply(panel.data(), rows, m, v.data(), z.data(), y.data());
+        kernel.multiply(panel.data(), rows, 3 * m, v.data(), z.data(), y.data());
+        kernel.multiply(panel.data(), detail::padded(r), n + m, v.data(), nullptr, y.data());
+        benchmark::DoNotOptimize(y.data());
+        benchmark::ClobberMemory();
+    }
+    bench.SetLabel(kernel.name);
+}
+
+void add(KernelKind kernel, const std::string& name) {
+    try {
+        detail::choose_kernel(kernel);
+    } catch (const ModelError&) {
+        return;
+    }
+    const auto in = [&name](const char* what) { return std::string(what) + "/" + name; };
+    benchmark::RegisterBenchmark(in("bare_products").c_str(), bare_products, kernel);
+    benchmark::RegisterBenchmark(in("two_mass").c_str(), two_mass, kernel);
+    for (const char* file : {"article_tractor.yaml", "tractor.yaml"}) {
+        const std::string machine = std::string(file).substr(0, std::string(file).find('.'));
+        benchmark::RegisterBenchmark((machine + "_locked/" + name).c_str(), tractor, file, kernel, false);
+        benchmark::RegisterBenchmark((machine + "_shifting/" + name).c_str(), tractor, file, kernel, true);
+    }
+}
+
+}  // namespace
+}  // namespace shiftrig::plant
+
+int main(int argc, char** argv) {
+    using shiftrig::plant::KernelKind;
+    shiftrig::plant::add(KernelKind::portable, "portable");
+    shiftrig::plant::add(KernelKind::avx2, "avx2");
+    shiftrig::plant::add(KernelKind::avx512, "avx512");
+    benchmark::Initialize(&argc, argv);
+    if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+    benchmark::RunSpecifiedBenchmarks();
+    return 0;
+}
