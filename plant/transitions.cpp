@@ -213,6 +213,12 @@ bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
     const double needed = s.torque[m.pairs + m.meshes + leader];
     unsigned char* trial = scratch.trial.data();
     std::copy(s.torque, s.torque + m.torques, scratch.torque_copy.data());
+    // To set it moving, the load must overcome what its pairs can hold, not what they pass on sliding.
+    double* sliding = scratch.vector_a.data();
+    std::copy(s.sliding, s.sliding + m.pairs, sliding);
+    for (int k = 0; k < m.pairs; ++k) {
+        if (part[k] != 0) s.sliding[k] = std::max(s.sliding[k], s.holding[k]);
+    }
     for (const double direction : {1., -1.}) {
         std::copy(w.contact, w.contact + m.contact_bytes, trial);
         for (int k = 0; k < m.contact_bytes; ++k) {
@@ -231,9 +237,12 @@ bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
                 log_event(w, EventKind::mesh_releases, m.pairs + k, s.at.time, s.torque[m.pairs + k], needed, 0);
             }
             std::copy(trial, trial + m.contact_bytes, w.contact);
+            std::copy(sliding, sliding + m.pairs, s.sliding);
+            contact_forces(w, w.contact, s);
             return true;
         }
     }
+    std::copy(sliding, sliding + m.pairs, s.sliding);
     contact_forces(w, w.contact, s);
     std::copy(scratch.torque_copy.begin(), scratch.torque_copy.end(), s.torque);
     return false;
