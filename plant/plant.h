@@ -177,4 +177,7 @@ struct Start {
 };
 void start(const Model& model, State& state, const Start& start, const Inputs& inputs);
 
+// Time 0 is now: steps, ways, heat and the energy account count from here on, the motion is as it was.
+void begin_account(const Model& model, State& state) noexcept;
+
 }  // namespace shiftrig::plant

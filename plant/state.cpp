@@ -208,4 +208,15 @@ void start(const Model& model, State& state, const Start& start, const Inputs& i
     initialise(m, state.block.data(), inputs.value, locked);
 }
 
+void begin_account(const Model& model, State& state) noexcept {
+    const ModelData& m = model.data();
+    double* block = state.block.data();
+    detail::write_integer(block, 0);
+    std::fill(block + m.layout.distances, block + m.layout.auxiliary, 0.);
+    std::fill(block + m.layout.heat, block + m.layout.temperatures, 0.);
+    double* energy = block + m.layout.energy;
+    energy[0] = energy[1] = 0;
+    energy[2] = detail::stored_energy(m, block + m.layout.speeds);
+}
+
 }  // namespace shiftrig::plant

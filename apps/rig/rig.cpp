@@ -109,6 +109,7 @@ void Rig::begin() {
 void Rig::settle(double seconds) {
     const auto steps = std::llround(seconds / model_.step_size());
     for (long long i = 0; i < steps; ++i) plant::step(model_, operators_, state_, inputs_, outputs_, scratch_);
+    plant::begin_account(model_, state_);
 }
 
 void Rig::tick() SHIFTRIG_REALTIME {
