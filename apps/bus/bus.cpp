@@ -1,5 +1,6 @@
 #include "apps/bus/bus.h"
 
+#include "io/can/candump.h"
 #include "io/can/open_port.h"
 #include "io/input_error.h"
 
@@ -34,18 +35,33 @@ Bus::Bus(const std::string& name, const io::can::Mapping* mapping, io::SignalTab
     }
     if (!name.starts_with("can:") && !name.starts_with("udpcan:"))
         throw io::InputError("bus " + name + ": unknown kind; it is inprocess, can:INTERFACE, udpcan:GROUP:PORT or lcm:URL");
-    auto can = can_options(options);
-    can.address_claim = io::can::AddressClaim::claim;
-    owned_ = io::can::open_port(name, io::can::filters_of(*mapping, can.role));
-    port_ = owned_.get();
-    can_.emplace(*mapping, *port_, signals, can);
+    owned_.push_back(io::can::open_port(name, io::can::filters_of(*mapping, can_options(options).role)));
+    join_can(*owned_.back(), *mapping, signals, options, io::can::AddressClaim::claim);
     can_->claim_addresses();
 }
 
 Bus::Bus(const std::string& name, io::can::CanPort& port, const io::can::Mapping& mapping, io::SignalTable& signals,
          const Options& options)
-    : name_(name), port_(&port) {
-    can_.emplace(mapping, port, signals, can_options(options));
+    : name_(name) {
+    join_can(port, mapping, signals, options, io::can::AddressClaim::settled);
+}
+
+void Bus::join_can(io::can::CanPort& wire, const io::can::Mapping& mapping, io::SignalTable& signals, const Options& options,
+                   io::can::AddressClaim claim) {
+    auto can = can_options(options);
+    can.address_claim = claim;
+    port_ = &wire;
+    if (!options.can_replay.empty()) {
+        const auto heard = io::can::message_filters(mapping, can.role);
+        owned_.push_back(std::make_unique<io::can::CandumpReplay>(options.can_replay, heard, port_));
+        port_ = owned_.back().get();
+    }
+    if (!options.can_log.empty()) {
+        const std::string interface = name_.starts_with("can:") ? name_.substr(4) : "can0";
+        owned_.push_back(std::make_unique<io::can::CandumpLogger>(*port_, options.can_log, interface));
+        port_ = owned_.back().get();
+    }
+    can_.emplace(mapping, *port_, signals, can);
 }
 
 std::uint64_t Bus::messages_lost() const noexcept {

@@ -30,6 +30,8 @@ struct Options {
     bool lockstep = false;
     std::string model_name;                // for who asks on LCM
     double command_timeout = 0.1;          // [s] LCM; on CAN the mapping says
+    std::string can_log;                   // candump log to write; empty: none
+    std::string can_replay;                // candump log whose frames arrive as if from the bus; empty: none
 };
 
 class Bus {
@@ -70,9 +72,13 @@ class Bus {
     io::can::CanLink* can() noexcept { return can_ ? &*can_ : nullptr; }
 
   private:
+    void join_can(io::can::CanPort& wire, const io::can::Mapping& mapping, io::SignalTable& signals, const Options& options,
+                  io::can::AddressClaim claim);
+
     std::string name_;
-    std::unique_ptr<io::can::CanPort> owned_;  // unless it is an end of the in-process bus
-    io::can::CanPort* port_ = nullptr;         // null: LCM
+    // Port upon port: the wire (unless it is an end of the in-process bus), a log replayed, a log written.
+    std::vector<std::unique_ptr<io::can::CanPort>> owned_;
+    io::can::CanPort* port_ = nullptr;  // the outermost; null: LCM
     std::optional<io::can::CanLink> can_;
     std::optional<io::lcm::LcmLink> lcm_;
 };

@@ -1,6 +1,6 @@
 #include "apps/rig/buses.h"
 
-#include <time.h>
+#include <stdexcept>
 
 #include "rt/clock.h"
 
@@ -15,20 +15,26 @@ Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tic
     options.model_name = model.description.name;
     options.command_timeout = model.controller.command_timeout;
 
+    options.can_log = setup.can_log;
+    options.can_replay = setup.can_replay;
+
     for (const auto& name : setup.names) {
         const bool frames = !name.starts_with("lcm:");
         if (frames && !mapping_)
             throw io::InputError(model.path, 0, 0, "bus " + name + " needs the stanza `can:`, which says what the frames mean");
         if (name != "inprocess") {
             buses_.emplace_back(name, mapping_ ? &*mapping_ : nullptr, signals, options);
-            continue;
+        } else {
+            if (wire_) throw std::invalid_argument("bus inprocess can be given only once");
+            wire_ = std::make_unique<io::can::InProcessBus>(2);
+            buses_.emplace_back(name, wire_->end(0), *mapping_, signals, options);
+            if (setup.built_in)
+                node_ = std::make_unique<tcu::Node>(*setup.built_in, "inprocess", wire_->end(1), *mapping_);
         }
-        if (wire_) throw io::InputError(model.path, 0, 0, "bus inprocess can be given only once");
-        wire_ = std::make_unique<io::can::InProcessBus>(2);
-        buses_.emplace_back(name, wire_->end(0), *mapping_, signals, options);
-        if (setup.built_in)
-            node_ = std::make_unique<tcu::Node>(*setup.built_in, "inprocess", wire_->end(1), *mapping_);
+        if (frames) options.can_log = options.can_replay = "";  // of the first CAN bus only
     }
+    if (!options.can_log.empty() || !options.can_replay.empty())
+        throw std::invalid_argument("a CAN log needs a CAN bus");
 }
 
 void Buses::receive(std::int64_t now_ns, io::SignalTable& signals) SHIFTRIG_REALTIME {

@@ -25,6 +25,7 @@ struct BusSetup {
     std::string calibration_path;                     // where that was read from
     std::vector<Silence> silences;                    // of the built-in controller
     bool lockstep = false;
+    std::string can_log, can_replay;                  // of the first CAN bus; see bus::Options
 };
 
 class Buses {

@@ -76,10 +76,12 @@ void choose_controller(const Choices& choices, Setup& setup) {
     const auto inprocess_given = [&] { return std::count(buses.names.begin(), buses.names.end(), "inprocess") > 0; };
 
     if (controller.empty()) {
-        const bool nobody = scripted.none || !setup.model.can.IsDefined() || (!buses.names.empty() && !inprocess_given());
+        const bool nobody = scripted.none || !choices.can_replay.empty() || !setup.model.can.IsDefined() || (!buses.names.empty() && !inprocess_given());
         controller = nobody ? "none" : "builtin";
     }
-    if (is_built_in(controller) && !inprocess_given()) buses.names.push_back("inprocess");
+    const bool logs = !choices.can_log.empty() || !choices.can_replay.empty();
+    const bool needs_a_bus = is_built_in(controller) || (logs && buses.names.empty());
+    if (needs_a_bus && !inprocess_given()) buses.names.push_back("inprocess");
     buses.silences = scripted.silences;
     if (!is_built_in(controller)) return;
     const std::string given = controller.size() > 8 ? controller.substr(8) : scripted.calibration;
@@ -96,6 +98,8 @@ Setup complete(const Choices& choices, Setup setup) {
     setup.kernel = kernel_named(choices.kernel);
     setup.buses.names = choices.buses;
     setup.buses.lockstep = choices.lockstep;
+    setup.buses.can_log = choices.can_log;
+    setup.buses.can_replay = choices.can_replay;
     choose_controller(choices, setup);
     return setup;
 }

@@ -17,6 +17,7 @@ struct Choices {
                                      // builtin on the in-process bus and nobody elsewhere
     std::string kernel = "auto";     // auto, portable, avx2, avx512
     bool lockstep = false;
+    std::string can_log, can_replay;  // candump logs: written, and heard as if from the bus
 };
 
 // Reads the files and settles what was left open. Throws InputError and std::invalid_argument: one clear line.

@@ -19,7 +19,6 @@
 #include "apps/shiftrig/loop_report.h"
 #include "apps/shiftrig/rig_options.h"
 #include "io/recording/csv.h"
-#include "io/recording/event_names.h"
 #include "io/recording/reader.h"
 #include "io/recording/snapshot.h"
 #include "rt/machine.h"
@@ -89,9 +88,8 @@ Beside prepare(const RunOptions& options, const rig::Rig& rig, const rt::LoopSet
 }
 
 nlohmann::json event_json(const analysis::Change& change) {
-    nlohmann::json event = {{"time_s", change.event.time}, {"text", change.text}};
+    nlohmann::json event = {{"time_s", change.event.time}, {"kind", change.kind}, {"text", change.text}};
     if (change.device.empty()) return event;
-    event["kind"] = io::name(change.event.kind);
     event["device"] = change.device;
     event["torque_nm"] = change.event.torque;
     event["capacity_nm"] = change.event.capacity;
@@ -244,6 +242,8 @@ Command::Run declare(CLI::App& app) {
     app.add_option("--csv", options->csv, "every signal of every tick");
     app.add_option("--snapshot-at", options->snapshot_at, "copy the rig at this time [s] into this file");
     app.add_option("--from", options->from, "go on from a snapshot; --duration counts from the start of its run");
+    app.add_option("--can-log", options->choices.can_log, "candump log of everything on the first CAN bus");
+    app.add_option("--can-replay", options->choices.can_replay, "candump log that takes the controller's place, at its own times");
     app.add_option("--trace", options->trace, "what the loop did when, for ui.perfetto.dev");
     app.add_flag("--json", options->json, "end with one JSON object on standard output");
     return [options] { return run(*options); };

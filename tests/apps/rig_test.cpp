@@ -1,0 +1,173 @@
+// The bench as a whole, in one process: standard scenarios, the silent controller, determinism.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "apps/rig/scenario_run.h"
+
+namespace shiftrig::rig {
+namespace {
+
+const std::string config = SHIFTRIG_SOURCE_DIR "/config/";
+
+io::ScenarioFile scenario(const std::string& name) { return io::read_scenario(config + "scenarios/" + name + ".yaml"); }
+
+// A scenario in the words of a test; it stands where the others do.
+io::ScenarioFile inline_scenario(const std::string& text) {
+    return io::parse_scenario("model: ../tractor.yaml\nabout: a test\n" + text, config + "scenarios/inline.yaml");
+}
+
+constexpr const char* ploughing_in_f2 = R"(
+start:
+  options: {range: M}
+  locked: [Fc, F2]
+  speeds: {engine_rpm: 1801}
+  inputs: {driver.throttle: 0.7281, driver.lever: 2, environment.draft: 1, clutch.F2.pressure_command_bar: 18}
+  settle_s: 5
+)";
+
+bool happened(const analysis::Run& run, const std::string& kind, const std::string& device) {
+    return std::any_of(run.changes.begin(), run.changes.end(),
+                       [&](const auto& change) { return change.kind == kind && change.device == device; });
+}
+
+const std::vector<double>& column(const analysis::Run& run, const std::string& name) {
+    const auto* found = run.column(name);
+    if (!found) throw std::invalid_argument("no column " + name);
+    return *found;
+}
+
+double highest(const std::vector<double>& values) {
+    double most = 0;
+    for (const double v : values) most = std::max(most, std::fabs(v));
+    return most;
+}
+
+double energy(const analysis::ShiftScore& shift, const std::string& clutch) {
+    const auto* metric = shift.find("clutch_energy_j." + clutch);
+    return metric && metric->value ? *metric->value : std::numeric_limits<double>::quiet_NaN();
+}
+
+TEST(Rig, PloughUpshiftTakesLessThan600MillisecondsAnd5KilojoulesInEachClutch) {
+    const auto result = run_scenario(scenario("plough_upshift"));
+    ASSERT_EQ(result.scorecard.shifts.size(), 1U);
+    const auto& shift = result.scorecard.shifts.front();
+    EXPECT_EQ(shift.shift.label(), "F2->F3");
+    EXPECT_TRUE(shift.shift.completed());
+    EXPECT_LT(shift.shift.duration(), 0.6);
+    EXPECT_LT(energy(shift, "F2"), 5000);
+    EXPECT_LT(energy(shift, "F3"), 5000);
+    EXPECT_FALSE(happened(result.run, "break_away", "Fc"));
+}
+
+TEST(Rig, FavourableTimingOfTheArticlesShiftKeepsMainClutchAndWheelsClosed) {
+    const auto good = run_scenario(scenario("article_fig11_good"));
+    for (const char* device : {"Fc", "Fw"}) {
+        EXPECT_FALSE(happened(good.run, "break_away", device)) << device;
+        EXPECT_EQ(highest(column(good.run, std::string("clutch.") + device + ".state")), 0) << device;
+    }
+    EXPECT_TRUE(happened(good.run, "lock", "F2"));
+}
+
+TEST(Rig, UnfavourableTimingMakesMainClutchAndWheelsSlipAndTheShaftTorquePeak) {
+    const auto good = run_scenario(scenario("article_fig11_good"));
+    const auto bad = run_scenario(scenario("article_fig11_bad"));
+    for (const char* device : {"Fc", "Fw"}) EXPECT_TRUE(happened(bad.run, "break_away", device)) << device;
+    for (const char* shaft : {"shaft.E1.torque", "shaft.E2.torque"})
+        EXPECT_GT(highest(column(bad.run, shaft)), 1.3 * highest(column(good.run, shaft))) << shaft;
+}
+
+TEST(Rig, TractorHeldOnASlopeCreepsLessThanANanometreInTenMinutes) {
+    const auto result = run_scenario(scenario("hold_on_slope"));
+    const auto& time = result.run.time;
+    const auto& distance = column(result.run, "body.vehicle.distance");
+    const auto& speed = column(result.run, "mass.vehicle.speed");
+    std::size_t stopped = 0;
+    for (std::size_t i = 0; i < speed.size(); ++i)
+        if (std::fabs(speed[i]) > 1e-3) stopped = i;
+    const auto begin = static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), time[stopped] + 60) - time.begin());
+    ASSERT_LT(begin, time.size());
+    EXPECT_GT(time.back() - time[begin], 590);
+    const auto [least, most] = std::minmax_element(distance.begin() + static_cast<std::ptrdiff_t>(begin), distance.end());
+    EXPECT_LT(*most - *least, 1e-9);
+    EXPECT_GT(column(result.run, "environment.grade").back(), 0.149);
+}
+
+TEST(Rig, SilentControllerLeadsToTheSafeCommandWithin150MillisecondsAndBackAgain) {
+    const auto result = run_scenario(inline_scenario(std::string(ploughing_in_f2) +
+                                                     "duration_s: 4\ncontroller: {silent: [{from_s: 1, until_s: 2}]}\n"));
+    const auto& run = result.run;
+    const auto& safe = column(run, "rig.safe_command");
+    const auto& f2 = column(run, "clutch.F2.pressure_command");
+    const auto& release = column(run, "clutch.Fc.release_command");
+    for (std::size_t i = 0; i < run.time.size(); ++i) {
+        const double t = run.time[i];
+        if (t < 1.08) EXPECT_EQ(safe[i], 0) << t;             // the last command came at most one cycle before 1 s
+        if (t > 1.112 && t < 2) EXPECT_EQ(safe[i], 1) << t;   // 100 ms of silence
+        if (t > 1.162 && t < 2) {                             // 50 ms of ramp
+            EXPECT_EQ(f2[i], 0) << t;
+            EXPECT_EQ(release[i], 1) << t;
+        }
+        if (t > 2.2) EXPECT_EQ(safe[i], 0) << t;
+    }
+    EXPECT_EQ(column(run, "clutch.F2.state").back(), 0) << "the gear is not taken again";
+    EXPECT_TRUE(happened(run, "safe_command", ""));
+    EXPECT_TRUE(happened(run, "commands_return", ""));
+}
+
+TEST(Rig, SameRunTwiceLeavesTheSameBits) {
+    const auto one = run_scenario(scenario("plough_upshift")), other = run_scenario(scenario("plough_upshift"));
+    ASSERT_EQ(one.run.columns.size(), other.run.columns.size());
+    for (std::size_t c = 0; c < one.run.columns.size(); ++c) {
+        if (one.run.columns[c].signal.name == "rig.tick_load") continue;  // what the machine took
+        EXPECT_EQ(one.run.columns[c].value, other.run.columns[c].value) << one.run.columns[c].signal.name;
+    }
+}
+
+TEST(Rig, LockstepInOneProcessIsTheFreeRunBitForBit) {
+    Choices lockstep;
+    lockstep.lockstep = true;
+    const auto one = run_scenario(scenario("plough_upshift")), other = run_scenario(scenario("plough_upshift"), lockstep);
+    EXPECT_EQ(other.report.unanswered, 0);
+    for (const char* name : {"mass.vehicle.speed", "clutch.F3.torque", "clutch.F3.pressure_command"})
+        EXPECT_EQ(column(one.run, name), column(other.run, name)) << name;
+}
+
+TEST(Rig, CommandThatIsNoNumberOrOutOfRangeIsLimitedAndNoted) {
+    Choices choices;
+    choices.controller = "none";
+    Rig rig(make_setup(choices, inline_scenario(std::string(ploughing_in_f2) + "duration_s: 1\n")));
+    const int command = rig.signals().find("clutch.F2.pressure_command");
+    const double before = rig.value(command);
+    ASSERT_TRUE(rig.request(command, std::numeric_limits<double>::quiet_NaN()));
+    rig.tick();
+    EXPECT_EQ(rig.value(command), before);
+    ASSERT_TRUE(rig.request(command, 1e12));
+    rig.tick();
+    EXPECT_EQ(rig.value(command), rig.signals().signal(command).maximum);
+    EXPECT_EQ(rig.value(rig.signals().find("rig.limited_inputs")), 2);
+    EXPECT_FALSE(rig.request(rig.signals().find("mass.vehicle.speed"), 1)) << "an output was set";
+}
+
+TEST(Rig, PedalReleasesTheMainClutchWhateverTheControllerSays) {
+    const auto result = run_scenario(inline_scenario(
+        std::string(ploughing_in_f2) + "duration_s: 2\ntimeline:\n  - {at_s: 0.5, over_s: 0.1, driver.clutch_pedal: 1}\n"));
+    EXPECT_EQ(column(result.run, "clutch.Fc.release_command").back(), 1);
+    EXPECT_EQ(column(result.run, "clutch.Fc.state").back(), 2);
+}
+
+TEST(Rig, ScenarioThatSetsAnOutputIsRefusedWithItsPlace) {
+    try {
+        make_setup({}, inline_scenario("duration_s: 1\n"));
+        const auto wrong = inline_scenario("duration_s: 1\ntimeline:\n  - {at_s: 0.5, mass.vehicle.speed_kmh: 3}\n");
+        Rig rig(make_setup({}, wrong));
+        FAIL() << "was accepted";
+    } catch (const io::InputError& error) {
+        EXPECT_EQ(std::string(error.what()), config + "scenarios/inline.yaml:5:17: mass.vehicle.speed_kmh is an output; it cannot be set");
+    }
+}
+
+}  // namespace
+}  // namespace shiftrig::rig

@@ -1,0 +1,183 @@
+"""`shiftrig run` and `shiftrig-tcu` as their user meets them: bad input, interruption, files left behind.
+
+usage: run_command_test.py SHIFTRIG SHIFTRIG_TCU CONFIG
+"""
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+SHIFTRIG, TCU, CONFIG = sys.argv[1:4]
+SHIFT = CONFIG + "/scenarios/plough_upshift.yaml"
+
+
+def run(*arguments, program=SHIFTRIG, prefix=(), **options):
+    command = [*prefix, program, *(["run"] if program == SHIFTRIG else []), *arguments]
+    return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=240, **options)
+
+
+def free(*arguments, scenario=SHIFT):
+    done = run("--scenario", scenario, "--pace", "free", "--json", *arguments)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+class InAFolder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def tractor_with(self, old, new):
+        """The tractor's file, changed in one place; returns its path and the line of the change."""
+        with open(CONFIG + "/tractor.yaml") as file:
+            text = file.read()
+        self.assertIn(old, text)
+        line = text[: text.index(old)].count("\n") + 1
+        text = text.replace(old, new, 1).replace("can/tractor.yaml", CONFIG + "/can/tractor.yaml")
+        with open(self.path("tractor.yaml"), "w") as file:
+            file.write(text)
+        return self.path("tractor.yaml"), line
+
+
+class BadInput(InAFolder):
+    def assert_one_line(self, done, pattern):
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+        self.assertRegex(done.stderr, pattern)
+        self.assertEqual(done.stdout, "")
+
+    def test_wrong_key(self):
+        path, line = self.tractor_with("outer_radius_m", "outer_radius_mm")
+        self.assert_one_line(run(path), re.escape(path) + ":%d:.*outer_radius_mm" % line)
+
+    def test_negative_inertia(self):
+        path, line = self.tractor_with("clutch_disc:  {inertia_kg_m2: 0.15", "clutch_disc:  {inertia_kg_m2: -0.15")
+        self.assert_one_line(run(path), re.escape(path) + r':%d:.*mass "clutch_disc".*-0\.15; must be > 0' % line)
+
+    def test_two_shafts_without_a_mass_between_them(self):
+        path, line = self.tractor_with("a: clutch_disc, b: input, stiffness", "a: clutch_disc, b: joint, stiffness")
+        self.assert_one_line(run(path), re.escape(path) + ":%d:.*damper.*joint" % line)
+
+    def test_missing_interface(self):
+        self.assert_one_line(run("--scenario", SHIFT, "--bus", "can:nosuch0"), "can:nosuch0")
+        self.assert_one_line(run("--bus", "can:nosuch0", program=TCU), "can:nosuch0")
+
+    def test_lcm_without_a_multicast_route(self):
+        alone = ("unshare", "--map-root-user", "--net")
+        done = run("--scenario", SHIFT, "--bus", "lcm:udpm://239.255.76.67:7667?ttl=0", prefix=alone)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("ip route add", done.stderr)
+
+    def test_unknown_bus_kernel_controller_and_files(self):
+        for arguments, pattern in [
+            (("--bus", "carrier:pigeon"), "carrier:pigeon: unknown kind"),
+            (("--kernel", "abacus"), "abacus"),
+            (("--rate-hz", "0"), "--rate-hz"),
+            (("--controller", "builtin:nosuch.yaml"), "nosuch.yaml"),
+            (("--can-replay", "nosuch.log"), "nosuch.log"),
+            (("--bus", "inprocess", "--bus", "inprocess"), "only once"),
+        ]:
+            self.assert_one_line(run("--scenario", SHIFT, *arguments), pattern)
+        self.assert_one_line(run("nosuch.yaml"), "nosuch.yaml")
+        self.assert_one_line(run(), "a model or a scenario is needed")
+
+    def test_recording_that_cannot_be_written(self):
+        self.assert_one_line(run("--scenario", SHIFT, "--record", "/nosuch/dir/x.lcmlog"), "/nosuch/dir/x.lcmlog")
+
+    def test_truncated_frames_are_counted_and_lead_to_the_safe_command(self):
+        log = self.path("shift.log")
+        free("--can-log", log)
+        with open(log) as file:
+            lines = file.read().splitlines()
+        with open(log, "w") as file:
+            for line in lines:  # from 3 s on, command frames lose their last byte
+                late = float(line.split(")")[0][1:]) >= 3
+                file.write((line.replace(line.split("#")[1].split()[0], line.split("#")[1].split()[0][:-2])
+                            if late and "18FF1" in line else line) + "\n")
+        done = run("--scenario", SHIFT, "--pace", "free", "--json", "--can-replay", log)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stderr, r"inprocess ClutchCommandA: \d+ of wrong length")
+        result = json.loads(done.stdout.splitlines()[-1])
+        self.assertEqual(result["final"]["rig.safe_command"], 1)
+        began = [e["time_s"] for e in result["events"] if e["kind"] == "safe_command"]
+        self.assertEqual(len(began), 1)
+        self.assertAlmostEqual(began[0], 3.1, delta=0.012)
+
+
+class Results(InAFolder):
+    def test_final_object(self):
+        result = free()
+        self.assertEqual(result["ticks"], 6000)
+        self.assertAlmostEqual(result["sim_time_s"], 6)
+        self.assertGreater(result["real_time_factor"], 1)
+        self.assertEqual(result["overruns"], 0)
+        self.assertEqual([s["to"] for s in result["shifts"]], ["F3"])
+        self.assertGreater(len(result["events"]), 3)
+        self.assertAlmostEqual(result["final"]["mass.vehicle.speed_m_s"] * 3.6, 8.63, delta=0.26)
+
+    def test_csv_has_every_tick_and_names_with_units(self):
+        path = self.path("shift.csv")
+        result = free("--csv", path)
+        with open(path) as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(len(rows), result["ticks"])
+        self.assertEqual(float(rows[-1]["mass.vehicle.speed_m_s"]), result["final"]["mass.vehicle.speed_m_s"])
+        self.assertEqual(os.listdir(self.folder), ["shift.csv"])
+
+    def test_recording_replays_bit_for_bit_and_the_trace_is_json(self):
+        recording, trace = self.path("shift.lcmlog"), self.path("trace.json")
+        free("--record", recording, "--trace", trace)
+        replayed = subprocess.run([SHIFTRIG, "replay", recording], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(replayed.returncode, 0, replayed.stderr + replayed.stdout)
+        with open(trace) as file:
+            self.assertTrue(json.load(file))
+
+    def test_candump_log_takes_the_controllers_place(self):
+        log = self.path("shift.log")
+        first = free("--can-log", log)
+        second = free("--can-replay", log)
+        self.assertEqual([(s["from"], s["to"], s["completed"]) for s in second["shifts"]], [("F2", "F3", True)])
+        for one, other in zip(first["shifts"], second["shifts"]):
+            self.assertAlmostEqual(one["ended_s"], other["ended_s"], delta=0.02)
+
+    def test_sigint_ends_the_run_with_everything_recorded(self):
+        recording = self.path("cut.lcmlog")
+        process = subprocess.Popen([SHIFTRIG, "run", "--scenario", SHIFT, "--pace", "wall", "--factor", "0.1", "--json",
+                                    "--record", recording], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while not os.path.exists(recording) or os.path.getsize(recording) < 200000:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 0, err)
+        result = json.loads(out.splitlines()[-1])
+        self.assertEqual(result["loop"]["outcome"], "stopped")
+        self.assertLess(result["ticks"], 6000)
+        replayed = subprocess.run([SHIFTRIG, "replay", recording, "--json"], stdout=subprocess.PIPE, text=True)
+        self.assertEqual(replayed.returncode, 0)
+        self.assertEqual(json.loads(replayed.stdout)["ticks"], result["ticks"])
+
+    def test_controller_that_ends_is_told_and_the_safe_command_acts(self):
+        done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "exit 3", "--pace", "wall", "--factor", "4",
+                   "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn('controller "exit 3" ended with status 3', done.stderr)
+        self.assertEqual(json.loads(done.stdout.splitlines()[-1])["final"]["rig.safe_command"], 1)
+
+    def test_nothing_but_the_result_where_there_is_no_terminal(self):
+        done = run("--scenario", SHIFT, "--pace", "free")
+        self.assertEqual(done.returncode, 0)
+        self.assertNotIn("\r", done.stderr + done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], "-v", *sys.argv[4:]])
