@@ -43,6 +43,7 @@ void fields(Fields& f, Calibration::Clutch& c) {
     using namespace io::rules;
     f.number("kiss_pressure_bar", c.kiss_pressure, positive, "torque begins here");
     f.number("torque_per_pressure_nm_per_bar", c.torque_per_pressure, positive, "sliding");
+    f.number("touch_pressure_bar", c.touch_pressure, positive, "a little above: holds the piston against the plates");
     f.number("full_pressure_bar", c.full_pressure, positive, "in gear");
     f.number("fill_pressure_bar", c.fill_pressure, positive, "command while filling");
     f.number("filled_margin_bar", c.filled_margin, not_negative, "below the kiss point, counts as filled");
@@ -61,6 +62,8 @@ void fields(Fields& f, Calibration::Shift& s) {
     f.number("hold_margin", s.hold_margin, at_least_one, "capacity of the offgoing clutch over its torque");
     f.number("timeout_s", s.timeout, positive, "of the inertia phase");
     f.number("pause_s", s.pause, not_negative, "between two shifts");
+    f.number("engine_lead_rpm", s.engine_lead, not_negative, "asked of a leading engine above its new speed");
+    f.number("engine_return_rad_s2", s.engine_return, positive, "how fast it is given back afterwards");
 }
 
 template <class Fields>
@@ -142,7 +145,7 @@ Calibration parse_calibration(const std::string& text, const std::string& path) 
 }
 
 double Calibration::pressure_for(double torque) const noexcept {
-    return std::min(clutch.kiss_pressure + std::max(0.0, torque) / clutch.torque_per_pressure, clutch.full_pressure);
+    return std::clamp(clutch.kiss_pressure + torque / clutch.torque_per_pressure, clutch.touch_pressure, clutch.full_pressure);
 }
 
 double Calibration::full_load(double engine_speed) const noexcept {

@@ -27,6 +27,7 @@ struct Calibration {
     struct Clutch {
         double kiss_pressure = 0;        // torque begins here [Pa]
         double torque_per_pressure = 0;  // sliding [Nm/Pa]
+        double touch_pressure = 0;       // a little above: holds the piston against the plates [Pa]
         double full_pressure = 0;        // in gear [Pa]
         double fill_pressure = 0;        // command while filling [Pa]
         double filled_margin = 0;        // measured pressure below kiss that counts as filled [Pa]
@@ -43,6 +44,8 @@ struct Calibration {
         double hold_margin = 0;     // capacity of the offgoing clutch over its torque [1]
         double timeout = 0;         // of the inertia phase; then the old gear is taken back [s]
         double pause = 0;           // between two shifts [s]
+        double engine_lead = 0;     // asked of the engine above its new speed, where it leads [rad/s]
+        double engine_return = 0;   // and how fast it is given back afterwards [rad/s²]
     } shift;
 
     struct Launch {
@@ -86,7 +89,7 @@ struct Calibration {
         std::string mapping;  // what the frames of a CAN bus mean; read relative to this file
     } bus;
 
-    double pressure_for(double torque) const noexcept;      // kiss pressure … full pressure [Pa]
+    double pressure_for(double torque) const noexcept;      // touch pressure … full pressure [Pa]
     double full_load(double engine_speed) const noexcept;   // [Nm]
 };
 

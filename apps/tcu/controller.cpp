@@ -22,6 +22,8 @@ Commands Controller::step(const Sensors& s) noexcept {
         case Mode::shift: shift(s, c); break;
         case Mode::limp: limp(s, c); break;
     }
+    if (c.engine_speed_request == 0) c.engine_speed_request = give_back_engine(s);
+    engine_request_ = c.engine_speed_request;
     c.mode = mode_;
     c.engaged = gear_ != 0;
     c.current_gear = mode_ == Mode::launch ? 0 : gear_;
@@ -154,6 +156,7 @@ void Controller::shift(const Sensors& s, Commands& c) noexcept {
     }
     if (up && s.lever < shift_.to()) shift_.cancel();
     shift_.step(*cal_, s, c);
+    c.engine_speed_request = shift_.engine_speed_request(*cal_, s);
     if (!shift_.over()) return;
 
     const bool done = shift_.phase() == Shift::Phase::finished;
@@ -166,6 +169,13 @@ void Controller::shift(const Sensors& s, Commands& c) noexcept {
     } else {
         begin_launch(s, gear_);  // take the old gear back as if starting off in it
     }
+}
+
+// After a shift the speed asked for comes down until the engine pushes no more: from there on the driver's throttle would
+// have it no slower.
+double Controller::give_back_engine(const Sensors& s) noexcept {
+    if (engine_request_ == 0 || mode_ != Mode::driving || s.engine_torque <= 0) return 0;
+    return std::max(0.0, engine_request_ - cal_->shift.engine_return * cal_->period);
 }
 
 // ---- limp ---------------------------------------------------------------------------------------------------

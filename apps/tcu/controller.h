@@ -50,6 +50,7 @@ class Controller {
     void limp(const Sensors& s, Commands& c) noexcept;
 
     void enter(Mode mode) noexcept;
+    double give_back_engine(const Sensors& s) noexcept;
     void begin_launch(const Sensors& s, int gear) noexcept;
     bool may_start_off(const Sensors& s, int gear) const noexcept;
     bool would_stall(const Sensors& s) const noexcept;
@@ -69,6 +70,7 @@ class Controller {
     double launch_speed_ = 0;     // of the engine when the launch began [rad/s]
     double launch_torque_ = 0;    // capacity asked for [Nm]
     double pressure_ = 0;         // commanded to the gear's clutch in launch and driving [Pa]
+    double engine_request_ = 0;   // asked of the engine [rad/s]; 0: nothing
     Shift shift_;
 };
 

@@ -32,6 +32,7 @@ enum class Mode { listening, neutral, launch, driving, shift, limp };
 struct Commands {
     std::array<double, clutch_count> pressure{};  // [Pa]
     double main_release = 0;                      // 0 closed … 1 open
+    double engine_speed_request = 0;              // asked of the engine by TSC1 [rad/s]; 0: nothing
     int current_gear = 0;                         // engaged
     int selected_gear = 0;                        // being engaged, or engaged
     bool shifting = false;
@@ -54,7 +55,7 @@ struct Fill {
         time += cal.period;
         const bool filled = measured_alive && measured >= cal.clutch.kiss_pressure - cal.clutch.filled_margin;
         done = done || filled || time >= cal.clutch.fill_timeout;
-        return done ? cal.clutch.kiss_pressure : cal.clutch.fill_pressure;
+        return done ? cal.clutch.touch_pressure : cal.clutch.fill_pressure;
     }
     bool done = false;
 };

@@ -78,7 +78,9 @@ void Node::find_signals() {
     at_.driveline_engaged = signals_.find("controller.driveline_engaged");
     at_.told_input_speed = signals_.find("controller.input_speed");
     at_.told_output_speed = signals_.find("controller.output_speed");
-    // The engine is left alone: no speed is asked of it, its torque is not limited.
+    at_.speed_request_enable = signals_.find("engine.engine.speed_request_enable");
+    at_.speed_request = signals_.find("engine.engine.speed_request");
+    // The engine's torque is not limited.
     if (const int limit = signals_.find("engine.engine.torque_limit"); limit >= 0)
         signals_.value[static_cast<std::size_t>(limit)] = 1;
 
@@ -119,6 +121,8 @@ void Node::say(const Sensors& sensors) noexcept {
     };
     for (std::size_t i = 0; i < clutch_count; ++i) set(at_.pressure_command[i], commands_.pressure[i]);
     set(at_.main_release, commands_.main_release);
+    set(at_.speed_request_enable, commands_.engine_speed_request > 0);
+    set(at_.speed_request, commands_.engine_speed_request);
     set(at_.selected_gear, commands_.selected_gear);
     set(at_.current_gear, commands_.current_gear);
     set(at_.shift_in_process, commands_.shifting);

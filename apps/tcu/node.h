@@ -48,6 +48,7 @@ class Node {
         int main_release;
         int selected_gear, current_gear, shift_in_process, limp, driveline_engaged;  // −1: the bus does not carry it
         int told_input_speed, told_output_speed;
+        int speed_request_enable, speed_request;
     };
     void find_signals();
     Sensors sense() const noexcept;

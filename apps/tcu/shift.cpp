@@ -28,6 +28,13 @@ double Shift::slipping_capacity(const Calibration& cal, const Sensors& s, double
     return std::max(0.0, std::copysign(1.0, slip) * torque);
 }
 
+double Shift::engine_speed_request(const Calibration& cal, const Sensors& s) const noexcept {
+    const double new_speed = s.input_speed - slip_of(cal, s, to_);
+    const bool leads_upwards = !pulls_ && (phase_ == Phase::inertia || phase_ == Phase::torque || phase_ == Phase::closing) &&
+                               to_ < from_;
+    return leads_upwards ? new_speed + cal.shift.engine_lead : 0;
+}
+
 void Shift::step(const Calibration& cal, const Sensors& s, Commands& c) noexcept {
     const auto on = static_cast<std::size_t>(clutch_of(to_)), off = static_cast<std::size_t>(clutch_of(from_));
     const double torque = std::abs(s.engine_torque);
@@ -55,7 +62,7 @@ void Shift::step(const Calibration& cal, const Sensors& s, Commands& c) noexcept
                 on_ = cal.pressure_for(slipping_capacity(cal, s, on_slip));
                 off_ = 0;
             } else {
-                on_ = cal.clutch.kiss_pressure;
+                on_ = cal.clutch.touch_pressure;
                 off_ = cal.pressure_for(slipping_capacity(cal, s, -on_slip));  // it slips towards the new speed
             }
             if (slip_.locked(cal, on_slip)) {
@@ -69,6 +76,7 @@ void Shift::step(const Calibration& cal, const Sensors& s, Commands& c) noexcept
         }
         case Phase::closing:
             off_ = 0;
+            on_ = std::max(on_, cal.pressure_for(cal.shift.hold_margin * torque));  // it has locked: let it stay so
             on_ = std::min(cal.clutch.full_pressure, on_ + cal.clutch.closing_rate * cal.period);
             if (on_ >= cal.clutch.full_pressure) enter(Phase::finished);
             break;

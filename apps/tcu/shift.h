@@ -12,6 +12,9 @@
 //
 //     T_c = T − J (ω' − ω)/t        in the direction of its slip, else nothing.
 //
+// Where the engine leads upwards, its governor would stop it at the speed the driver's throttle allows; so the new speed
+// is asked of it by TSC1 until the shift is over, and then given back slowly (controller.cpp).
+//
 // T comes from the engine's own message, so the law follows the governor; t never falls below `shortest_to_go`, which
 // bounds the gain of this loop against the lag of the valve.
 #pragma once
@@ -33,6 +36,8 @@ class Shift {
     int from() const noexcept { return from_; }
     int to() const noexcept { return to_; }
     Phase phase() const noexcept { return phase_; }
+    // What the engine should run at now [rad/s]; 0: as the driver has it.
+    double engine_speed_request(const Calibration& cal, const Sensors& s) const noexcept;
     bool over() const noexcept { return phase_ == Phase::finished || phase_ == Phase::abandoned; }
 
   private:
@@ -43,10 +48,8 @@ class Shift {
     bool pulls_ = true;         // the oncoming clutch pulls; else the engine leads
     Phase phase_ = Phase::finished;
     double in_phase_ = 0;       // [s]
-    double held_torque_ = 0;    // carried by the offgoing clutch when the shift began [Nm]
     double on_ = 0, off_ = 0;   // commands [Pa]
     double handed_over_ = 0;    // share of the torque phase that is done [1]
-    bool cancelled_ = false;
     Fill fill_;
     SlipWatch slip_;
 };
