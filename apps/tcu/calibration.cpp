@@ -100,6 +100,7 @@ void fields(Fields& f, Calibration::Stop& s) {
     using namespace io::rules;
     f.number("stall_guard_speed_rpm", s.stall_guard_speed, positive, "below it the driveline is opened");
     f.number("brake_speed_rpm", s.brake_speed, positive, "the same while braking");
+    f.number("look_ahead_s", s.look_ahead, not_negative, "the engine's speed so far ahead is what counts");
     f.number("relaunch_speed_rpm", s.relaunch_speed, positive, "the engine must be above it to start off");
     f.number("brake_applied", s.brake_applied, efficiency, "pedal that counts as applied");
 }

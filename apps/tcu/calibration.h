@@ -74,6 +74,7 @@ struct Calibration {
     struct Stop {
         double stall_guard_speed = 0;  // below it the driveline is opened [rad/s]
         double brake_speed = 0;        // the same while the brake is applied [rad/s]
+        double look_ahead = 0;         // the engine's speed so far ahead is what counts [s]
         double relaunch_speed = 0;     // the engine must be above it to start again [rad/s]
         double brake_applied = 0;      // pedal that counts as applied [1]
     } stop;

@@ -9,6 +9,7 @@ Commands Controller::step(const Sensors& s) noexcept {
 
     trusted_ = trusts(s) ? trusted_ + cal_->period : 0;
     if (trusted_ > 0) choice_.observe(*cal_, s);
+    watch_engine(s);
     if (mode_ == Mode::listening && trusted_ > 0) listen(s);
     if (trusted_ == 0 && mode_ != Mode::limp && mode_ != Mode::listening) {
         if (mode_ != Mode::driving) gear_ = 0;  // half-done engagements are opened
@@ -143,7 +144,14 @@ void Controller::driving(const Sensors& s, Commands& c) noexcept {
 
 bool Controller::would_stall(const Sensors& s) const noexcept {
     const bool braking = s.brake >= cal_->stop.brake_applied || s.parking_brake;
-    return s.engine_speed < (braking ? cal_->stop.brake_speed : cal_->stop.stall_guard_speed);
+    return s.engine_speed + engine_slowing_ * cal_->stop.look_ahead < (braking ? cal_->stop.brake_speed : cal_->stop.stall_guard_speed);
+}
+
+void Controller::watch_engine(const Sensors& s) noexcept {
+    constexpr double share = 0.3;  // of each new difference: a filter of some three cycles
+    const double change = (s.engine_speed - engine_speed_) / cal_->period;
+    engine_slowing_ = std::min(0.0, engine_slowing_ + share * (change - engine_slowing_));
+    engine_speed_ = s.engine_speed;
 }
 
 // ---- shift --------------------------------------------------------------------------------------------------
@@ -167,7 +175,8 @@ void Controller::shift(const Sensors& s, Commands& c) noexcept {
     if (std::abs(slip_of(*cal_, s, gear_)) < cal_->limp.slip) {
         enter(Mode::driving);
     } else {
-        begin_launch(s, gear_);  // take the old gear back as if starting off in it
+        // Take the old gear back as if starting off in it; if the tractor has slowed down meanwhile, a lower one.
+        begin_launch(s, up ? std::min(gear_, choice_.starting(*cal_, s)) : gear_);
     }
 }
 

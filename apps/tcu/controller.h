@@ -53,6 +53,7 @@ class Controller {
     double give_back_engine(const Sensors& s) noexcept;
     void begin_launch(const Sensors& s, int gear) noexcept;
     bool may_start_off(const Sensors& s, int gear) const noexcept;
+    void watch_engine(const Sensors& s) noexcept;
     bool would_stall(const Sensors& s) const noexcept;
     bool trusts(const Sensors& s) noexcept;
 
@@ -61,6 +62,8 @@ class Controller {
     Mode mode_ = Mode::listening;
     int gear_ = 0;             // that is locked, or being launched in; 0 none
     double in_mode_ = 0;       // time since the mode was entered [s]
+    double engine_speed_ = 0;  // in the last cycle [rad/s]
+    double engine_slowing_ = 0;// filtered, ≤ 0 [rad/s²]
     double slipping_ = 0;      // slip in gear at full pressure for so long [s]
     double trusted_ = 0;       // signals believable for so long [s]
     int failed_lever_ = 0;     // where the lever stood when an engagement failed: not again until it moves

@@ -8,7 +8,8 @@ void Shift::begin(const Calibration& cal, const Sensors& s, int from, int to) no
     to_ = to;
     phase_ = Phase::fill;
     off_ = cal.clutch.full_pressure;
-    pulls_ = slip_of(cal, s, to) * s.engine_torque >= 0;  // T would drive the input away from its new speed
+    first_slip_ = slip_of(cal, s, to);
+    pulls_ = first_slip_ * s.engine_torque >= 0;  // T would drive the input away from its new speed
 }
 
 void Shift::enter(Phase phase) noexcept {
@@ -65,7 +66,9 @@ void Shift::step(const Calibration& cal, const Sensors& s, Commands& c) noexcept
                 on_ = cal.clutch.touch_pressure;
                 off_ = cal.pressure_for(slipping_capacity(cal, s, -on_slip));  // it slips towards the new speed
             }
-            if (slip_.locked(cal, on_slip)) {
+            // A leading engine passes the new speed and must be caught there.
+            const bool passed = !pulls_ && on_slip * first_slip_ <= 0;
+            if (slip_.locked(cal, on_slip) || passed) {
                 enter(pulls_ ? Phase::closing : Phase::torque);
             } else if (in_phase_ > cal.shift.timeout) {
                 if (pulls_) enter(Phase::abandoned);

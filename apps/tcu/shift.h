@@ -46,6 +46,7 @@ class Shift {
 
     int from_ = 0, to_ = 0;
     bool pulls_ = true;         // the oncoming clutch pulls; else the engine leads
+    double first_slip_ = 0;     // of the oncoming clutch when the shift began [rad/s]
     Phase phase_ = Phase::finished;
     double in_phase_ = 0;       // [s]
     double on_ = 0, off_ = 0;   // commands [Pa]

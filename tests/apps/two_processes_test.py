@@ -75,33 +75,37 @@ class TwoProcesses(unittest.TestCase):
                 self.assertEqual(finals[0][name], finals[1][name], name)
 
     def test_wall_pace_makes_the_same_shift(self):
-        watch = None
-        if BUS.startswith("can:"):
-            log = tempfile.TemporaryFile("w+")
-            watch = subprocess.Popen(["candump", "-L", BUS[4:]], stdout=log)
-            time.sleep(0.2)
-        tcu = controller()
-        # A tenth of real time: whether the machine keeps up is not the question here.
-        result = result_of(rig("--pace", "wall", "--factor", "0.2", "--controller", "none"))
-        self.assertEqual(end(tcu), 0)
+        # Whether the machine keeps up is not the question here: a run in which it did not (a tick 20 ms late, and with
+        # it perhaps a time-out) is done again.
+        for _ in range(5):
+            with tempfile.TemporaryFile("w+") as log:
+                watch = None
+                if BUS.startswith("can:"):
+                    watch = subprocess.Popen(["candump", "-L", BUS[4:]], stdout=log)
+                    time.sleep(0.2)
+                tcu = controller()
+                result = result_of(rig("--pace", "wall", "--controller", "none"))
+                self.assertEqual(end(tcu), 0)
+                if watch:
+                    end(watch)
+                    log.seek(0)
+                    seen = {line.split()[2].split("#")[0] for line in log}
+                    self.assertEqual(sorted(set(IDENTIFIERS) - seen), [])
+            if result["loop"]["lateness_ns"]["max"] < 20e6:
+                break
         self.assert_the_shift(result)
-        if watch:
-            end(watch)
-            log.seek(0)
-            seen = {line.split()[2].split("#")[0] for line in log}
-            self.assertEqual(sorted(set(IDENTIFIERS) - seen), [])
 
     def test_controller_killed_in_mid_shift_leaves_the_safe_command(self):
-        # The controller as the rig's child: killed 2.15 s into the scenario, while F3 fills.
+        # The controller as the rig's child, which is given a second to begin: killed while F3 fills.
         command = "exec %s --bus '%s'" % (TCU, BUS)
-        process = rig("--pace", "wall", "--factor", "0.2", "--controller", command)
+        process = rig("--pace", "wall", "--factor", "0.5", "--controller", command)
         time.sleep(0.1)
         deadline = time.time() + 60
         while time.time() < deadline:
             children = subprocess.run(["pgrep", "-P", str(process.pid)], stdout=subprocess.PIPE, text=True).stdout.split()
             if children:
                 break
-        time.sleep(2.15 / 0.2)
+        time.sleep(1 + 2.15 / 0.5)
         os.kill(int(children[0]), signal.SIGKILL)
         out, err = process.communicate(timeout=240)
         self.assertEqual(process.returncode, 0, err)
