@@ -95,6 +95,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     if (s.begin_groups != &mode) {
         read_groups(m, t, begin.z, v.begin);
         group_forces(t, begin.f, v.begin.force);
+        s.begin_groups = &mode;
     }
     for (int g = 0; g < t.paths.groups; ++g) v.momentum[g] = t.mass[g] * v.begin.speed[g];
     std::copy(begin.auxiliary_rate, begin.auxiliary_rate + m.auxiliary, v.auxiliary[0]);
@@ -161,11 +162,7 @@ double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     ScratchData& s = w.scratch;
     const TreeMode& t = *mode.tree;
     TreeWork v(m, s.workspace.data());
-    if (s.begin_groups != &mode) {
-        read_groups(m, t, s.begin.z, v.begin);
-        group_forces(t, s.begin.f, v.begin.force);
-    }
-    const double h = s.end.at.time - s.begin.at.time;
+    const double h = s.end.at.time - s.begin.at.time;  // begin's groups are those that advance_tree started from
     const MiddleSums sums{h,
                           {v.begin.speed, v.end.speed},
                           {v.begin.torque, v.end.torque},

@@ -287,7 +287,8 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     block[layout.energy] += s.input_work;
     block[layout.energy + 1] += s.dissipated;
 
-    certificate.energy_defect = stored_energy(m, s.begin.z) - before - s.input_work + s.dissipated;
+    s.stored = stored_energy(m, s.begin.z);
+    certificate.energy_defect = s.stored - before - s.input_work + s.dissipated;
     certificate.torque_residual = mode.tree ? s.torque_residual : torque_residual(w, mode, s.begin);
     certificate.constraint_violation = constraint_violation(w, mode, s.begin.z);
     certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
@@ -304,6 +305,7 @@ void finish_look(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     w.outputs.certificate.torque_residual = torque_residual(w, mode, s);
     w.outputs.certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     w.outputs.event_count = 0;
+    w.scratch.stored = stored_energy(w.model, s.z);
     fill_outputs(w, mode, s);
 }
 

@@ -95,7 +95,7 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
     }
     if (m.description.oil) put(w.operators.oil_temperature, w.operators.oil.viscosity);
 
-    const double stored = stored_energy(m, speeds);
+    const double stored = w.scratch.stored;
     const double* energy = block + m.layout.energy;
     put(energy[0], stored, energy[1], stored - energy[2] - energy[0] + energy[1]);
     const Certificate& c = w.outputs.certificate;

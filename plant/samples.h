@@ -77,6 +77,7 @@ struct ScratchData {
     std::vector<double> torque_copy;
     std::vector<double> heat;        // per pair in this step [J]
     double dissipated = 0, input_work = 0;  // in this step [J]
+    double stored = 0;               // at its end [J]
     double viscosity = 0, oil_temperature = 0;
     std::vector<double> workspace;   // of the mode builder
     std::vector<int> workspace_index;

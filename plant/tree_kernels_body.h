@@ -88,7 +88,16 @@ inline void eliminate(const TreePaths& t, const double* __restrict lower, double
             const int stop = t.parent[p] > a_begin ? t.parent[p] : a_begin;
             int a = b_begin - 1;
             double ra = right[a];
-            while (b > b_begin && a > stop) {
+            int common = b - b_begin < a - stop ? b - b_begin : a - stop;
+            for (; common >= 4; common -= 4, a -= 4, b -= 4) {
+                for (int i = 0; i < 4; ++i) {
+                    rb = SHIFTRIG_FMA(lower[b - i], rb, right[b - i - 1]);
+                    ra = SHIFTRIG_FMA(lower[a - i], ra, right[a - i - 1]);
+                    right[b - i - 1] = rb;
+                    right[a - i - 1] = ra;
+                }
+            }
+            for (; common > 0; --common) {
                 rb = SHIFTRIG_FMA(lower[b], rb, right[b - 1]);
                 ra = SHIFTRIG_FMA(lower[a], ra, right[a - 1]);
                 right[--b] = rb;
@@ -144,7 +153,16 @@ inline void substitute(const TreePaths& t, const double* __restrict lower,
             const int b_end = t.begin[p + 2];
             double qb = head(p + 1);
             int b = a_end + 1;
-            while (a < a_end && b < b_end) {
+            int common = a_end - a < b_end - b ? a_end - a : b_end - b;
+            for (; common >= 4; common -= 4, a += 4, b += 4) {
+                for (int i = 0; i < 4; ++i) {
+                    qa = SHIFTRIG_FMA(lower[a + i], qa, speed[a + i]);
+                    qb = SHIFTRIG_FMA(lower[b + i], qb, speed[b + i]);
+                    speed[a + i] = qa;
+                    speed[b + i] = qb;
+                }
+            }
+            for (; common > 0; --common) {
                 qa = SHIFTRIG_FMA(lower[a], qa, speed[a]);
                 qb = SHIFTRIG_FMA(lower[b], qb, speed[b]);
                 speed[a++] = qa;
