@@ -100,7 +100,7 @@ Manifest Manifest::from_json(const std::string& text) {
         m.outputs = signals_of(document.at("outputs"));
         m.rig = signals_of(document.at("rig"));
         document.at("devices").get_to(m.devices);
-        if (!(m.step_size > 0) || m.substeps < 1 || m.tick_ns < 1)
+        if (!(m.step_size > 0) || m.substeps < 1 || m.substeps > 1'000'000 || m.tick_ns < 1)
             throw RecordingError("its manifest has an impossible step size");
         return m;
     } catch (const json::exception& error) {

@@ -28,6 +28,14 @@ long flipped_bit(std::vector<std::byte> data) {
     return -1;
 }
 
+// A name from the file, fit for a message.
+std::string printable(std::string_view name) {
+    std::string text(name.substr(0, 60));
+    for (char& c : text)
+        if (c < ' ' || c > '~') c = '?';
+    return text;
+}
+
 // Everything that belongs to one chunked content.
 struct Collected {
     std::vector<std::byte> bytes;
@@ -130,8 +138,8 @@ void RecordingReader::Implementation::read_header() {
             if (number == 0)
                 throw RecordingError(
                     path + ": is an LCM event log, but no recording of shiftrig (its first channel is " +
-                    std::string(event.channel.substr(0, 60)) + ")");
-            damaged("channel " + std::string(event.channel.substr(0, 60)) + " among the opening records");
+                    printable(event.channel) + ")");
+            damaged("channel " + printable(event.channel) + " among the opening records");
             throw RecordingError(complaint);
         }
         record_chunk_t chunk;
@@ -293,7 +301,7 @@ bool RecordingReader::Implementation::next(RecordedTick& tick) {
             if (!first || blocks > 0) return damaged("a tick without its closing record");
             return stop(Ending::complete, "");
         } else {
-            return damaged("unknown channel " + std::string(event.channel.substr(0, 60)));
+            return damaged("unknown channel " + printable(event.channel));
         }
     }
     return false;

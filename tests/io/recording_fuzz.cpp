@@ -25,7 +25,8 @@ void read(const std::uint8_t* data, std::size_t size) {
         if ((reader.ending() == shiftrig::io::Ending::complete) != reader.complaint().empty()) ::abort();
         if (reader.complaint().find('\n') != std::string::npos) ::abort();
     } catch (const shiftrig::io::RecordingError& error) {
-        if (std::string(error.what()).empty()) ::abort();
+        const std::string line = error.what();
+        if (line.empty() || line.find('\n') != std::string::npos) ::abort();
     }
     ::close(fd);
 }

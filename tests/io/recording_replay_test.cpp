@@ -232,7 +232,7 @@ TEST(FieldReplay, FitsTheMachineThatMadeTheData) {
                                 30 / std::acos(-1.0) * value(m.outputs, tick.outputs, "mass.engine.speed"),
                                 3.6 * value(m.outputs, tick.outputs, "mass.vehicle.speed"),
                                 1.5};
-        for (const double cell : cells) text += std::to_string(cell) + (&cell == &cells[7] ? "\n" : ";");
+        for (const double& cell : cells) text += std::to_string(cell) + (&cell == &cells[7] ? "\n" : ";");
     }
     write_file(field.path, text);
     ModelFile file = recorded_model_file(m);
