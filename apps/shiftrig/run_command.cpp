@@ -29,7 +29,9 @@ namespace {
 
 struct RunOptions : RigOptions {
     std::string record, csv, trace;
-    std::pair<double, std::string> snapshot_at{-1, ""};  // time [s], file
+    double controller_start_s = 1;
+    std::pair<double, std::string> snapshot_at{-1, ""
+};  // time [s], file
     std::string from;                                    // snapshot to go on from
     bool json = false;
 };
@@ -206,7 +208,10 @@ int run(const RunOptions& options) {
     rig::Session session(rig, std::move(session_options));
 
     std::optional<Child> controller;
-    if (const auto command = rig::controller_command(options.choices); !command.empty()) controller.emplace(command);
+    if (const auto command = rig::controller_command(options.choices); !command.empty()) {
+        controller.emplace(command);
+        std::this_thread::sleep_for(std::chrono::duration<double>(options.controller_start_s));
+    }
     {
         const SignalsStop signals_stop(session.control());
         run_loop(session, options, live, controller ? &*controller : nullptr);
@@ -245,6 +250,9 @@ Command::Run declare(CLI::App& app) {
     app.add_option("--can-log", options->choices.can_log, "candump log of everything on the first CAN bus");
     app.add_option("--can-replay", options->choices.can_replay, "candump log that takes the controller's place, at its own times");
     app.add_option("--trace", options->trace, "what the loop did when, for ui.perfetto.dev");
+    app.add_option("--controller-start", options->controller_start_s, "seconds a command given as --controller has to get ready")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
     app.add_flag("--json", options->json, "end with one JSON object on standard output");
     return [options] { return run(*options); };
 }

@@ -5,7 +5,7 @@ target_compile_definitions(rig_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_
 gtest_discover_tests(rig_test DISCOVERY_TIMEOUT 60)
 
 set(SHIFT ${CMAKE_SOURCE_DIR}/config/scenarios/plough_upshift.yaml)
-set(TWO_PROCESSES python3 ${CMAKE_CURRENT_LIST_DIR}/two_processes_test.py
+set(TWO_PROCESSES /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/two_processes_test.py
   $<TARGET_FILE:shiftrig> $<TARGET_FILE:shiftrig-tcu> ${SHIFT})
 add_test(NAME two_processes_on_vcan COMMAND ${TWO_PROCESSES} can:vcan0)
 set_tests_properties(two_processes_on_vcan PROPERTIES LABELS vcan)
@@ -13,5 +13,5 @@ set(MULTICAST ${CMAKE_SOURCE_DIR}/tests/io/with_multicast.sh)
 add_test(NAME two_processes_on_lcm COMMAND ${MULTICAST} ${TWO_PROCESSES} lcm:udpm://239.255.76.67:7667?ttl=0)
 add_test(NAME two_processes_on_udpcan COMMAND ${MULTICAST} ${TWO_PROCESSES} udpcan:239.74.163.2:43113)
 
-add_test(NAME run_command_test COMMAND python3 ${CMAKE_CURRENT_LIST_DIR}/run_command_test.py
+add_test(NAME run_command_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/run_command_test.py
   $<TARGET_FILE:shiftrig> $<TARGET_FILE:shiftrig-tcu> ${CMAKE_SOURCE_DIR}/config)

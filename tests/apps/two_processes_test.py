@@ -14,7 +14,7 @@ import unittest
 RIG, TCU, SCENARIO, BUS = sys.argv[1:5]
 IDENTIFIERS = ["18FF1003", "18FF1103", "18FF1203", "18FF2080", "18FF2180", "18FF2280", "18FF3080", "18FF3180",
                "0CF00400", "0CF00300", "0CF00203", "18F00503", "0C010305", "0C000003", "18FEF100", "18F0010B",
-               "18FEF803", "0CFE48F0", "0CFE49F0"]
+               "18FEF880", "0CFE48F0", "0CFE49F0"]
 
 
 def rig(*arguments, bus=BUS):
