@@ -15,18 +15,18 @@ class TractorShift : public testing::TestWithParam<cases::Shift> {
         static std::map<cases::Shift, ShiftTrace> cache;
         const auto found = cache.find(GetParam());
         if (found != cache.end()) return found->second;
-        return cache.emplace(GetParam(), run_reference(cases::tractor_shift(GetParam()), 2e-5)).first->second;
+        return cache.emplace(GetParam(), run_reference(cases::tractor_shift(GetParam()), 4e-5)).first->second;
     }
     static ShiftTrace plant(int steps_per_millisecond) {
         return run_plant(cases::tractor_shift(GetParam()), steps_per_millisecond);
     }
 };
 
-// Reached: 8e-9. Two programs, two people's reading of one set of equations.
+// Two statements of one set of equations, two methods. Reached: 1.2e-7 here, 8e-9 at 50 steps a millisecond.
 TEST_P(TractorShift, ConvergesToTheReferenceSolver) {
     ASSERT_EQ(truth().fall_backs, 0);
-    const TraceError e = error(plant(50), truth());
-    EXPECT_LT(e.worst, 3e-8) << e.signal;
+    const TraceError e = error(plant(16), truth());
+    EXPECT_LT(e.worst, 3e-7) << e.signal;
 }
 
 TEST_P(TractorShift, IsWithinFiveTenThousandthsAtOneMillisecond) {
