@@ -157,6 +157,82 @@ TEST(Ark3, RunsWithLossyGearsAgreeWithTheDenseEngine) {
     EXPECT_EQ(result.differ, 0) << result.worst;
 }
 
+// Engine lag and boost, tyre slip, resistances and a converted wheel: what goes with the explicit table.
+TEST(Ark3, VehicleWithEngineAndTyreAgreesWithTheDenseEngine) {
+    Description d;
+    d.name = "vehicle";
+    d.masses = {mass("engine", 2.6, 150), mass("disc", 0.2, 0), mass("input", 0.3, 0), mass("axle", 5, 0),
+                mass("wheels", 550, 0)};
+    Mass body = mass("vehicle", 14000, 0);
+    body.motion = Motion::translating;
+    d.masses.push_back(body);
+    d.clutches = {clutch("Fc", "engine", "disc", 1200, 1.15, ActuationDirect{sine(1, 0.25), 0})};
+    d.shafts = {{"damper", "disc", "input", 12000, 15, 0}, {"half", "axle", "wheels", 2.8e6, 8000, 0}};
+    d.gears = {lossy_gear("final", "input", "axle", 80, 0.9, 2)};
+    BrixiusTyre tyre;
+    tyre.name = "tyre";
+    tyre.wheel = "wheels";
+    tyre.body = "vehicle";
+    tyre.radius = 0.935;
+    tyre.mobility_number = 55;
+    tyre.relaxation_length = 0.6;
+    tyre.slip_damping_time = 0.05;
+    tyre.weight = 137293;
+    tyre.rolling_coefficient = 0.04;
+    d.tyres = {tyre};
+    Engine engine;
+    engine.name = "diesel";
+    engine.mass = "engine";
+    engine.full_load = {{70, 550}, {150, 1150}, {200, 1000}, {230, 700}};
+    engine.governor_slope = 187;
+    engine.low_idle = 94;
+    engine.high_idle = 229;
+    engine.friction_constant = 70;
+    engine.actuator_lag = 0.04;
+    engine.turbo_instant_fraction = 0.62;
+    engine.turbo_lag = 0.5;
+    engine.fade_from = 70;
+    engine.fade_to = 50;
+    engine.stall_speed = 40;
+    d.engines = {engine};
+    Road road;
+    road.name = "road";
+    road.body = "vehicle";
+    road.mass = 14000;
+    road.air_coefficient = 2.8;
+    d.roads = {road};
+    Plough plough;
+    plough.name = "plough";
+    plough.body = "vehicle";
+    plough.soil_factor = 0.5;
+    plough.a = 652;
+    plough.c = 5.1;
+    plough.width = 1;
+    plough.depth = 0.2;
+    d.ploughs = {plough};
+
+    const BuildOptions options{1e-4, KernelKind::automatic};
+    Rig dense(with(d, Method::etd3), options), tree(with(d, Method::ark3), options);
+    for (Rig* rig : {&dense, &tree}) {
+        rig->in("driver.throttle") = 0.6;
+        rig->in("environment.draft") = 1;
+    }
+    double worst = 0;
+    for (int step = 0; step < 20000; ++step) {
+        dense.step();
+        tree.step();
+        for (const char* name :
+             {"mass.engine.speed", "mass.input.speed", "mass.wheels.speed", "mass.vehicle.speed"}) {
+            worst = std::max(worst, std::fabs(dense.out(name) - tree.out(name)));
+        }
+    }
+    EXPECT_GT(tree.out("mass.vehicle.speed"), 1) << "it drove off";
+    EXPECT_GT(tree.out("energy.input"), 1e4);
+    EXPECT_LT(worst, 1e-3);
+    EXPECT_NEAR(tree.out("body.vehicle.acceleration"), dense.out("body.vehicle.acceleration"), 1e-3);
+    EXPECT_LT(std::fabs(tree.out("energy.defect")), 1e-6 * tree.out("energy.input"));
+}
+
 // ---- the choice of engine ---------------------------------------------------------------------------------
 
 Description chain(int n) {
