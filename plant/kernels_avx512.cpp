@@ -50,6 +50,7 @@ inline void multiply_panels(const double* p, int columns, const double* v, const
 
 }  // namespace
 
+SHIFTRIG_TRUSTED_BEGIN  // the compiler cannot see through a function handed on
 void multiply_avx512(const double* panel, int rows, int columns, const double* v, const double* y0,
                      double* y) SHIFTRIG_REALTIME {
     int r = 0;
@@ -64,6 +65,7 @@ void multiply_avx512(const double* panel, int rows, int columns, const double* v
         default: return;
     }
 }
+SHIFTRIG_TRUSTED_END
 
 }  // namespace shiftrig::plant::detail
 #endif

@@ -158,7 +158,7 @@ struct TreeWork {
     double *stage_torque[3], *stage_force[3], *stage_rate[3];
     double* auxiliary[4];
     double *load, *potential;
-    TreeWork(const ModelData& model, double* memory) noexcept;
+    TreeWork(const ModelData& model, double* memory) SHIFTRIG_REALTIME;
     static int doubles(const ModelData& model) noexcept;
 };
 

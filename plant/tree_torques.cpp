@@ -56,7 +56,7 @@ int TreeWork::doubles(const ModelData& m) noexcept {
     return (3 * 6 + 8 + 3 * 3) * stride(m) + 4 * m.auxiliary;
 }
 
-TreeWork::TreeWork(const ModelData& m, double* memory) noexcept {
+TreeWork::TreeWork(const ModelData& m, double* memory) SHIFTRIG_REALTIME {
     const auto take = [&, length = stride(m)] {
         double* const at = memory + margin;
         memory += length;

@@ -5,3 +5,8 @@ if(NOT CMAKE_CXX_FLAGS MATCHES "fsanitize")
   target_link_libraries(realtime_test PRIVATE shiftrig_rig GTest::gtest_main)
   gtest_discover_tests(realtime_test)
 endif()
+if(NOT CMAKE_CXX_FLAGS MATCHES "fsanitize" AND SHIFTRIG_BENCH)
+  add_test(NAME Soak.OneMinuteUnderStallsAndThreePassesOfAllScenarios COMMAND ${CMAKE_SOURCE_DIR}/scripts/soak suite)
+  set_tests_properties(Soak.OneMinuteUnderStallsAndThreePassesOfAllScenarios PROPERTIES
+    ENVIRONMENT "SHIFTRIG_PROGRAMS=${CMAKE_BINARY_DIR}" PASS_REGULAR_EXPRESSION "soak passed" LABELS slow)
+endif()
