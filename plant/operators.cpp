@@ -128,6 +128,7 @@ void at_oil_temperature(const ModelData& m, OperatorsData& o, double temperature
 Operators::Operators(const Model& model) : data_(std::make_unique<detail::OperatorsData>(model.data())) {}
 Operators::~Operators() = default;
 Operators::Operators(Operators&&) noexcept = default;
+Operators& Operators::operator=(Operators&&) noexcept = default;
 
 void Operators::drop() noexcept {
     for (detail::Mode& mode : data_->modes) mode.last_use = 0;

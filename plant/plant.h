@@ -142,6 +142,7 @@ class Operators {
     explicit Operators(const Model& model);
     ~Operators();
     Operators(Operators&&) noexcept;
+    Operators& operator=(Operators&&) noexcept;
     void drop() noexcept;  // forget every cached mode; the next step rebuilds, bit for bit
     detail::OperatorsData& data() noexcept { return *data_; }
 
@@ -154,6 +155,7 @@ class Scratch {
     explicit Scratch(const Model& model);
     ~Scratch();
     Scratch(Scratch&&) noexcept;
+    Scratch& operator=(Scratch&&) noexcept;
     void fill_with_nan() noexcept;  // for the test that nothing in it survives a step
     detail::ScratchData& data() noexcept { return *data_; }
 

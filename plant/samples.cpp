@@ -58,6 +58,7 @@ ScratchData::ScratchData(const ModelData& m) {
 Scratch::Scratch(const Model& model) : data_(std::make_unique<detail::ScratchData>(model.data())) {}
 Scratch::~Scratch() = default;
 Scratch::Scratch(Scratch&&) noexcept = default;
+Scratch& Scratch::operator=(Scratch&&) noexcept = default;
 
 void Scratch::fill_with_nan() noexcept {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();

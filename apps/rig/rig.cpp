@@ -191,6 +191,19 @@ void Rig::take_requests() SHIFTRIG_REALTIME {
     }
 }
 
+void Rig::change_machine(io::ModelFile file) {
+    Setup changed = setup_;
+    changed.model = std::move(file);
+    changed = with_options(std::move(changed));
+    plant::Model model = build(changed);
+    if (model.state_size() != model_.state_size())
+        throw std::invalid_argument("this changes what the machine's state is made of: start the rig anew with it");
+    setup_.model = std::move(changed.model);
+    model_ = std::move(model);
+    operators_ = plant::Operators(model_);
+    scratch_ = plant::Scratch(model_);
+}
+
 bool Rig::request(int signal, double value) SHIFTRIG_REALTIME {
     if (signal < 0 || signal >= signals_.size() || !settable_[static_cast<std::size_t>(signal)]) return false;
     return requests_.push({signal, value});

@@ -96,6 +96,9 @@ class Rig {
     // A change of an input or of a driver's signal from another thread, taken at the next tick; false if `signal` may
     // not be set or too many are waiting. One thread only.
     bool request(int signal, double value) noexcept;
+    // The same machine with other parameters, from the next tick on; not while the loop runs. Throws InputError, and
+    // std::invalid_argument where the parameter changes what the state is made of (a dead time).
+    void change_machine(io::ModelFile model);
     // From the loop: how late the last tick was (overruns so far), and its compute time over the period.
     void report_timing(std::int64_t overruns, double load) SHIFTRIG_REALTIME;
 

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "analysis/report/shift_page.h"
+#include "apps/rig/variation.h"
 #include "apps/serve/machine_page.h"
 
 namespace shiftrig::serve {
@@ -175,7 +176,7 @@ void Dashboard::tell_events() {
     while (happenings_.pop(happening)) {
         const std::string text = happening.of_the_rig ? rig::explain(rig_.signals(), happening.own)
                                                       : plant::explain(rig_.model(), happening.plant);
-        feed_.change("change", json{{"text", text}}.dump());
+        tell(text);
     }
 }
 
@@ -260,24 +261,61 @@ std::string Dashboard::command(std::string_view verb, const std::string& text) {
         between_stretches([this, active] {
             if (recording_) recording_->end();
             recording_.reset();
-            if (!active) return;
-            recorded_to_ = options_.record_path;
-            if (recordings_++ > 0) {
-                const std::filesystem::path path(options_.record_path);
-                recorded_to_ =
-                    (path.parent_path() /
-                     (path.stem().string() + "-" + std::to_string(recordings_) + path.extension().string()))
-                        .string();
-            }
-            try {
-                recording_ = std::make_unique<io::RecordingWriter>(recorded_to_);
-            } catch (const io::RecordingError& error) {
-                feed_.change("change", json{{"text", error.what()}}.dump());
-            }
+            if (active) begin_recording();
         });
         return "";
     }
+    if (verb == "parameter") {
+        if (!body.contains("name") || !body["name"].is_string()) return "\"name\" must be a parameter";
+        if (auto wrong = number_in(body, "value", value); !wrong.empty()) return wrong;
+        const std::string name = body["name"].get<std::string>();
+        const auto all = parameters_of(rig_.model().description());
+        if (std::none_of(all.begin(), all.end(), [&](const Parameter& p) { return p.name == name; }))
+            return "there is no parameter \"" + name + "\"";
+        between_stretches([this, name, value] { set_parameter(name, value); });
+        return "";
+    }
     return "there is no command \"" + std::string(verb) + "\"";
+}
+
+// Each recording is a file of its own: shiftrig.lcmlog, shiftrig-2.lcmlog, …
+void Dashboard::begin_recording() {
+    const std::filesystem::path path(options_.record_path);
+    recorded_to_ = options_.record_path;
+    if (recordings_++ > 0)
+        recorded_to_ = path.parent_path() /
+                       (path.stem().string() + "-" + std::to_string(recordings_) + path.extension().string());
+    try {
+        recording_ = std::make_unique<io::RecordingWriter>(recorded_to_);
+    } catch (const io::RecordingError& error) {
+        tell(error.what());
+    }
+}
+
+// A recording holds one machine, so that it can be replayed: it ends with a change, and another goes on.
+void Dashboard::set_parameter(const std::string& name, double value) {
+    const io::ModelFile& present = rig_.setup().model;
+    try {
+        rig::YamlVariant variant(present.text, present.path);
+        variant.set(name, value, false);
+        rig_.change_machine(io::parse_model(variant.text(), present.path));
+    } catch (const std::exception& error) {
+        return tell(error.what());
+    }
+    char number[32];
+    std::snprintf(number, sizeof number, "%.6g", value);
+    std::string text = "t=" + std::to_string(rig_.sim_time()) + " " + name + " is set to " + number;
+    if (recording_) {
+        recording_->end();
+        recording_.reset();
+        begin_recording();
+        text += "; recording goes on in " + recorded_to_;
+    }
+    tell(text);
+}
+
+void Dashboard::tell(const std::string& text) {
+    feed_.change("change", json{{"text", text}}.dump());
 }
 
 std::string Dashboard::recording_bytes() const {

@@ -31,7 +31,6 @@ struct DashboardOptions {
     rt::LoopSettings loop;
     std::string record_path;  // where recordings begun from the page go; later ones get a number
     bool record_at_once = false;
-    std::function<void(const std::string&)> say;  // one line for the terminal
 };
 
 class Dashboard {
@@ -78,6 +77,9 @@ class Dashboard {
     std::string model_json() const;
     std::string recording_bytes() const;
     void between_stretches(std::function<void()> what);
+    void begin_recording();
+    void set_parameter(const std::string& name, double value);
+    void tell(const std::string& text);
 
     rig::Rig& rig_;
     DashboardOptions options_;
@@ -89,7 +91,7 @@ class Dashboard {
     rt::Queue<Happening> happenings_{4096};
     Frame filling_;
     std::int64_t last_frame_ns_ = 0;
-    int limp_ = -1;  // signal, where the bus carries it
+    int limp_ = -1;            // signal, where the bus carries it
     std::vector<int> judged_;  // signals in a Row
     analysis::Run recent_;     // the last minute, for the scorecard
     double told_until_ = 0;    // end of the last shift told [s]

@@ -29,6 +29,12 @@ class Page {
         for (const auto& fault : faults_of(rig_))
             page["faults"].push_back({{"name", fault.name}, {"label", fault.label}});
         page["parameters"] = json::array();
+        for (const auto& parameter : parameters_of(machine_))
+            page["parameters"].push_back({{"name", parameter.name},
+                                          {"device", parameter.device},
+                                          {"label", parameter.label},
+                                          {"unit", parameter.unit},
+                                          {"value", parameter.value}});
         page["driveline_svg"] = analysis::driveline_svg(machine_);
         return page;
     }
@@ -194,6 +200,30 @@ std::vector<Fault> faults_of(const rig::Rig& rig) {
     for (const auto& sensor : machine.sensors)
         add("sensor." + sensor.name + ".dropout", sensor.name + ".dropout", "no " + sensor.name + " speed",
             1);
+    return list;
+}
+
+std::vector<Parameter> parameters_of(const plant::Description& machine) {
+    std::vector<Parameter> list;
+    for (const auto& clutch : machine.clutches) {
+        const auto add = [&](const char* key, const char* label, const char* unit, double value) {
+            list.push_back({"clutches." + clutch.name + "." + key, clutch.name, label, unit, value});
+        };
+        if (const auto* wet = std::get_if<plant::WetPlates>(&clutch.friction)) {
+            add("wet_plates.mu_static", "static friction", "", wet->mu_static);
+            add("wet_plates.mu_sliding", "sliding friction", "", wet->mu_sliding);
+            add("wet_plates.mu_rise", "rise towards rest", "", wet->mu_rise);
+        }
+        if (const auto* dry = std::get_if<plant::DryFriction>(&clutch.friction))
+            add("dry.sliding_capacity_nm", "sliding capacity", "Nm", dry->sliding_capacity);
+        if (const auto* valve = std::get_if<plant::ActuationHydraulic>(&clutch.actuation)) {
+            add("hydraulic.natural_frequency_rad_s", "valve frequency", "rad/s", valve->natural_frequency);
+            add("hydraulic.damping_ratio", "valve damping", "", valve->damping_ratio);
+            add("hydraulic.slew_bar_per_s", "slew", "bar/s", valve->slew * 1e-5);
+            add("hydraulic.fill_volume_cm3", "fill volume", "cm³", valve->fill_volume * 1e6);
+            add("hydraulic.fill_flow_l_per_min", "fill flow", "l/min", valve->fill_flow * 6e4);
+        }
+    }
     return list;
 }
 

@@ -18,4 +18,12 @@ struct Fault {
 };
 std::vector<Fault> faults_of(const rig::Rig& rig);
 
+// A number of the model file that may be changed while the rig runs, in the file's unit.
+struct Parameter {
+    std::string name;  // "clutches.F2.wet_plates.mu_sliding"
+    std::string device, label, unit;
+    double value = 0;
+};
+std::vector<Parameter> parameters_of(const plant::Description& machine);
+
 }  // namespace shiftrig::serve

@@ -77,10 +77,13 @@ function faults(list) {
 }
 
 function parameters(list) {
-  return panel("Parameters", list.length ? list.map((p) => {
-    const field = h("input", { type: "number", value: p.value, step: "any", "aria-label": p.label, "data-parameter": p.name });
-    return h("label", { class: "control row" }, h("span", { style: "flex:1" }, p.label, p.unit ? ` [${p.unit}]` : ""), field, h("button", { onclick: () => post("/api/parameter", { name: p.name, value: Number(field.value) }) }, "Set"));
-  }) : h("p", { class: "faint" }, "None in this model."));
+  if (!list.length) return panel("Parameters", h("p", { class: "faint" }, "None in this model."));
+  const devices = [...new Set(list.map((p) => p.device))];
+  const field = (p) => {
+    const input = h("input", { type: "number", value: Number(p.value.toPrecision(6)), step: "any", "aria-label": `${p.device} ${p.label}`, "data-parameter": p.name });
+    return h("div", { class: "row parameter" }, h("span", {}, p.label, p.unit ? ` [${p.unit}]` : ""), input, h("button", { onclick: () => post("/api/parameter", { name: p.name, value: Number(input.value) }) }, "Set"));
+  };
+  return panel("Parameters", devices.map((device) => h("details", {}, h("summary", {}, device), list.filter((p) => p.device === device).map(field))));
 }
 
 function transport() {
