@@ -174,6 +174,7 @@ std::string Dashboard::sample_json(const Frame& frame) const {
 void Dashboard::tell_events() {
     Happening happening;
     while (happenings_.pop(happening)) {
+        const std::lock_guard lock(mutex_);  // the machine may be changed between two stretches
         const std::string text = happening.of_the_rig ? rig::explain(rig_.signals(), happening.own)
                                                       : plant::explain(rig_.model(), happening.plant);
         tell(text);
@@ -204,6 +205,7 @@ void Dashboard::judge_shifts() {
 // ---- HTTP threads ---------------------------------------------------------------------------------------
 
 std::string Dashboard::model_json() const {
+    const std::lock_guard lock(mutex_);
     return machine_page(rig_).dump();
 }
 
@@ -269,7 +271,11 @@ std::string Dashboard::command(std::string_view verb, const std::string& text) {
         if (!body.contains("name") || !body["name"].is_string()) return "\"name\" must be a parameter";
         if (auto wrong = number_in(body, "value", value); !wrong.empty()) return wrong;
         const std::string name = body["name"].get<std::string>();
-        const auto all = parameters_of(rig_.model().description());
+        std::vector<Parameter> all;
+        {
+            const std::lock_guard lock(mutex_);
+            all = parameters_of(rig_.model().description());
+        }
         if (std::none_of(all.begin(), all.end(), [&](const Parameter& p) { return p.name == name; }))
             return "there is no parameter \"" + name + "\"";
         between_stretches([this, name, value] { set_parameter(name, value); });
