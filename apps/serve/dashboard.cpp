@@ -19,7 +19,6 @@ using nlohmann::json;
 namespace {
 
 constexpr auto feed_interval = std::chrono::milliseconds(40);
-constexpr std::int64_t frame_interval_ns = 15'000'000;
 constexpr double kept_seconds = 60;  // for the scorecard of the last shift
 
 // What a number in a command is, or why it is none.
@@ -71,7 +70,7 @@ rt::LoopReport Dashboard::run() {
         session_options.loop = options_.loop;
         session_options.loop.slots = slots_left;
         session_options.recording = recording_.get();
-        session_options.after = [this](rig::Rig& r, const rt::Tick& t) { take(r, t); };
+        session_options.after = [this](rig::Rig& each, const rt::Tick&) { take(each); };
         rig::Session session(rig_, std::move(session_options));
         {
             const std::lock_guard lock(mutex_);
@@ -102,7 +101,7 @@ void Dashboard::between_stretches(std::function<void()> what) {
 
 // ---- in the loop ----------------------------------------------------------------------------------------
 
-void Dashboard::take(const rig::Rig& rig, const rt::Tick& tick) SHIFTRIG_REALTIME {
+void Dashboard::take(const rig::Rig& rig) SHIFTRIG_REALTIME {
     const double time = rig.sim_time();
     Row row;
     row.time = time;
@@ -111,8 +110,6 @@ void Dashboard::take(const rig::Rig& rig, const rt::Tick& tick) SHIFTRIG_REALTIM
     for (const auto& event : rig.plant_events()) happenings_.push({false, event, {}});
     for (const auto& event : rig.rig_events()) happenings_.push({true, {}, event});
 
-    if (tick.start - last_frame_ns_ < frame_interval_ns && tick.start >= last_frame_ns_) return;
-    last_frame_ns_ = tick.start;
     filling_.time = time;
     filling_.ticks = rig.ticks();
     filling_.overruns = static_cast<std::int64_t>(rig.value(rig.own().overruns));

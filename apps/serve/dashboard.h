@@ -64,7 +64,7 @@ class Dashboard {
     };
 
     // In the loop.
-    void take(const rig::Rig& rig, const rt::Tick& tick) SHIFTRIG_REALTIME;
+    void take(const rig::Rig& rig) SHIFTRIG_REALTIME;
 
     // In the feeding thread.
     void feed();
@@ -90,7 +90,6 @@ class Dashboard {
     rt::Queue<Row> rows_{8192};
     rt::Queue<Happening> happenings_{4096};
     Frame filling_;
-    std::int64_t last_frame_ns_ = 0;
     int limp_ = -1;            // signal, where the bus carries it
     std::vector<int> judged_;  // signals in a Row
     analysis::Run recent_;     // the last minute, for the scorecard
