@@ -51,6 +51,11 @@ void Bus::join_can(io::can::CanPort& wire, const io::can::Mapping& mapping, io::
     auto can = can_options(options);
     can.address_claim = claim;
     port_ = &wire;
+    if (options.can_faults) {
+        auto faulty = std::make_unique<io::can::FaultyPort>(*port_, *options.can_faults, mapping);
+        port_ = faulty_ = faulty.get();
+        owned_.push_back(std::move(faulty));
+    }
     if (!options.can_replay.empty()) {
         const auto heard = io::can::message_filters(mapping, can.role);
         owned_.push_back(std::make_unique<io::can::CandumpReplay>(options.can_replay, heard, port_));

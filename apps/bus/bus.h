@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "io/can/faults.h"
 #include "io/can/inprocess.h"
 #include "io/can/link.h"
 #include "io/can/mapping.h"
@@ -32,6 +33,7 @@ struct Options {
     double command_timeout = 0.1;          // [s] LCM; on CAN the mapping says
     std::string can_log;                   // candump log to write; empty: none
     std::string can_replay;                // candump log whose frames arrive as if from the bus; empty: none
+    const io::can::FaultPlan* can_faults = nullptr;  // how the bus misbehaves; looked at while it is opened
 };
 
 class Bus {
@@ -60,9 +62,14 @@ class Bus {
         return lcm_ ? std::optional(lcm_->rig_time_ns()) : std::nullopt;
     }
 
+    // A fault of the bus that began or ended since the last call.
+    bool next_fault(io::can::FaultEvent& event) SHIFTRIG_REALTIME { return faulty_ && faulty_->next_event(event); }
+
     // For snapshots: the link of an in-process bus. What stands behind other buses is the world's, which has no snapshot.
     void archive(io::Archive& a) {
-        if (can_ && name_ == "inprocess") can_->archive(a);
+        if (!can_ || name_ != "inprocess") return;
+        can_->archive(a);
+        if (faulty_) faulty_->archive(a);
     }
 
     const std::string& name() const noexcept { return name_; }
@@ -76,9 +83,10 @@ class Bus {
                   io::can::AddressClaim claim);
 
     std::string name_;
-    // Port upon port: the wire (unless it is an end of the in-process bus), a log replayed, a log written.
+    // Port upon port: the wire (unless it is an end of the in-process bus), its faults, a log replayed, a log written.
     std::vector<std::unique_ptr<io::can::CanPort>> owned_;
     io::can::CanPort* port_ = nullptr;  // the outermost; null: LCM
+    io::can::FaultyPort* faulty_ = nullptr;  // one of them, if there are faults
     std::optional<io::can::CanLink> can_;
     std::optional<io::lcm::LcmLink> lcm_;
 };

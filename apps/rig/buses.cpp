@@ -15,6 +15,16 @@ Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tic
     options.model_name = model.description.name;
     options.command_timeout = model.controller.command_timeout;
 
+    if (!setup.faults.IsNull() && mapping_) {
+        faults_ = io::can::parse_faults(setup.faults, setup.faults_file, *mapping_);
+        options.can_faults = &*faults_;
+        for (std::size_t i = 0; i < faults_->faults.size(); ++i) {
+            plant::Signal status;
+            status.name = "bus.fault." + std::to_string(i + 1) + ".status";
+            status.description = describe(faults_->faults[i]);
+            fault_signals_.push_back(signals.add(status));
+        }
+    }
     options.can_log = setup.can_log;
     options.can_replay = setup.can_replay;
 
@@ -26,7 +36,9 @@ Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tic
             buses_.emplace_back(name, mapping_ ? &*mapping_ : nullptr, signals, options);
         } else {
             if (wire_) throw std::invalid_argument("bus inprocess can be given only once");
-            wire_ = std::make_unique<io::can::InProcessBus>(2);
+            io::can::InProcessOptions timing;
+            if (faults_) timing.bit_rate = faults_->bit_rate;
+            wire_ = std::make_unique<io::can::InProcessBus>(2, timing);
             buses_.emplace_back(name, wire_->end(0), *mapping_, signals, options);
             if (setup.built_in)
                 node_ = std::make_unique<tcu::Node>(*setup.built_in, "inprocess", wire_->end(1), *mapping_);
@@ -38,7 +50,11 @@ Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tic
 }
 
 void Buses::receive(std::int64_t now_ns, io::SignalTable& signals) SHIFTRIG_REALTIME {
-    for (auto& each : buses_) each.receive(now_ns, signals);
+    for (auto& each : buses_) {
+        each.receive(now_ns, signals);
+        for (io::can::FaultEvent event; each.next_fault(event);)
+            signals.value[static_cast<std::size_t>(fault_signals_[static_cast<std::size_t>(event.fault)])] = event.begins ? 1 : 0;
+    }
 }
 
 void Buses::send(std::int64_t now_ns, const io::SignalTable& signals) SHIFTRIG_REALTIME {

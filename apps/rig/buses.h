@@ -26,6 +26,8 @@ struct BusSetup {
     std::vector<Silence> silences;                    // of the built-in controller
     bool lockstep = false;
     std::string can_log, can_replay;                  // of the first CAN bus; see bus::Options
+    YAML::Node faults;                                // of every CAN bus (io/can/faults.h); null: none
+    std::string faults_file;                          // where they are written
 };
 
 class Buses {
@@ -62,9 +64,11 @@ class Buses {
     bool silent_at(std::int64_t now_ns) const SHIFTRIG_REALTIME;
 
     std::optional<io::can::Mapping> mapping_;
+    std::optional<io::can::FaultPlan> faults_;
     std::unique_ptr<io::can::InProcessBus> wire_;     // ends: 0 the rig, 1 the built-in controller
     std::vector<bus::Bus> buses_;
     std::unique_ptr<tcu::Node> node_;
+    std::vector<int> fault_signals_;  // `bus.fault.<n>.status`: 1 while it acts
     std::vector<Silence> silences_;
     bool silent_ = false;
 };

@@ -100,6 +100,10 @@ Setup complete(const Choices& choices, Setup setup) {
     setup.buses.lockstep = choices.lockstep;
     setup.buses.can_log = choices.can_log;
     setup.buses.can_replay = choices.can_replay;
+    if (setup.scenario && setup.scenario->bus_faults.IsDefined()) {
+        setup.buses.faults = setup.scenario->bus_faults;
+        setup.buses.faults_file = setup.scenario->path;
+    }
     choose_controller(choices, setup);
     return setup;
 }

@@ -29,6 +29,8 @@ std::string explain(const io::SignalTable& signals, const RigEvent& event) {
         case RigEventKind::commands_return:
             return time + std::string("valid commands are heard again");
         case RigEventKind::message_status: {
+            if (signal.starts_with("bus.fault."))
+                return std::string(time) + "bus fault \"" + signals.signal(event.signal).description + "\" " + (event.value != 0 ? "begins" : "ends");
             const auto status = static_cast<std::size_t>(event.value);
             return time + signal + ": " + (status < statuses.size() ? statuses[status] : "unknown");
         }

@@ -3,6 +3,7 @@
 //
 //     bus_faults:                       # of a scenario; or the list alone, with seed 1
 //       seed: 7
+//       bit_rate: 250000                # the in-process bus with arbitration and the true length of frames
 //       faults:
 //         - {fault: drop, message: ClutchCommandA, from_s: 2, until_s: 2.5, probability: 0.3}
 //         - {fault: delay, from_s: 3, by_ms: 20}                        # every message, both ways, to the end
@@ -59,6 +60,7 @@ struct BusFault {
 
 struct FaultPlan {
     std::uint64_t seed = 1;
+    double bit_rate = 0;  // [bit/s] of an in-process bus that takes its time, with arbitration; 0: it takes none
     std::vector<BusFault> faults;
 };
 

@@ -162,8 +162,9 @@ class Reader {
         if (const YAML::Node when = node["when"]) {
             if (!when.IsMap() || when.size() != 1)
                 fail(when, label + ": when must be {SIGNAL: [raw values]}");
-            result.when = layout_signal(when.begin()->first, layout);
-            for (const auto& value : when.begin()->second)
+            const YAML::detail::iterator_value entry = *when.begin();  // the iterator's arrow yields a temporary
+            result.when = layout_signal(entry.first, layout);
+            for (const auto& value : entry.second)
                 result.when_is.push_back(integer(value, 0, INT64_MAX));
             result.otherwise = number(need(node, "otherwise"));
         }

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "io/can/candump.h"
+#include "io/can/codec.h"
 #include "io/can/dbc.h"
 #include "io/can/inprocess.h"
 #include "io/can/link.h"
