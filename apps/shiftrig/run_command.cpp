@@ -30,8 +30,7 @@ namespace {
 struct RunOptions : RigOptions {
     std::string record, csv, trace;
     double controller_start_s = 1;
-    std::pair<double, std::string> snapshot_at{-1, ""
-};  // time [s], file
+    std::pair<double, std::string> snapshot_at{-1, ""};  // time [s], file
     std::string from;                                    // snapshot to go on from
     bool json = false;
 };
