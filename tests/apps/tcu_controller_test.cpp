@@ -97,10 +97,17 @@ TEST(Controller, PowerDownshiftLetsTheOffgoingClutchSlipFirst) {
     ASSERT_EQ(bench.c.mode, Mode::shift);
     bench.pressure(2) = calibration().clutch.kiss_pressure;
     bench.cycle(0.05);
-    EXPECT_EQ(bench.command(2), calibration().clutch.kiss_pressure);
+    EXPECT_EQ(bench.command(2), calibration().clutch.touch_pressure);
     const double carries = calibration().pressure_for(bench.s.engine_torque);
     EXPECT_LT(bench.command(3), carries);  // less than the engine gives: the input speeds up
-    EXPECT_GT(bench.command(3), calibration().clutch.kiss_pressure);
+    EXPECT_GT(bench.command(3), calibration().clutch.touch_pressure);
+    // The governor would hold the engine at the driver's speed: the new one is asked of it.
+    EXPECT_GT(bench.c.engine_speed_request, Bench::ratio(2) * bench.s.output_speed);
+    // It passes its new speed: the oncoming clutch catches it at once.
+    bench.s.input_speed = bench.s.engine_speed = 1.02 * Bench::ratio(2) * bench.s.output_speed;
+    bench.cycle(0.02 + calibration().shift.torque_time);
+    EXPECT_EQ(bench.command(3), 0);
+    EXPECT_GE(bench.command(2), calibration().pressure_for(bench.s.engine_torque));
 }
 
 TEST(Controller, UpshiftThatTheEngineCouldNotBearIsRefused) {
@@ -204,6 +211,19 @@ TEST(Controller, DrivelineOpensBeforeTheBrakeStallsTheEngine) {
     EXPECT_EQ(bench.sum_of_commands(), 0);
 }
 
+TEST(Controller, EngineThatFallsFastIsSavedBeforeItIsSlow) {
+    Bench bench(2, 900, 500);
+    EXPECT_EQ(bench.c.mode, Mode::driving);
+    for (int i = 0; i < 10; ++i) {  // 1200 rpm a second
+        bench.s.engine_speed -= 12 * rpm;
+        bench.s.input_speed = bench.s.engine_speed;
+        bench.s.output_speed = bench.s.input_speed / Bench::ratio(2);
+        bench.cycle();
+    }
+    EXPECT_GT(bench.s.engine_speed, calibration().stop.stall_guard_speed);
+    EXPECT_EQ(bench.c.mode, Mode::neutral);
+}
+
 TEST(Controller, ReverseIsEngagedOnlyBelowTheReversalSpeed) {
     Bench bench(2);
     bench.s.lever = -1;
@@ -230,8 +250,11 @@ TEST(Controller, StandingStartRaisesTheTorqueAndYieldsToADroopingEngine) {
     bench.cycle(1);
     const double pulling = bench.command(1);
     EXPECT_DOUBLE_EQ(pulling, calibration().pressure_for(calibration().launch.torque));
-    bench.s.engine_speed *= 1 - calibration().launch.engine_droop / 2;
-    bench.cycle(0.02);
+    const double before = bench.s.engine_speed;
+    for (int i = 1; i <= 50; ++i) {
+        bench.s.engine_speed = before * (1 - calibration().launch.engine_droop / 2 * i / 50);
+        bench.cycle();
+    }
     EXPECT_NEAR(bench.command(1), calibration().pressure_for(calibration().launch.torque / 2), 1);
 }
 
