@@ -25,11 +25,13 @@ concept Clock = requires(C clock, std::int64_t time) {
 
 // CLOCK_MONOTONIC: never set, slewed at most; it runs on while the process is stopped.
 struct SteadyClock {
+    SHIFTRIG_TRUSTED_BEGIN  // clock_gettime does not enter the kernel
     std::int64_t now() const SHIFTRIG_REALTIME {
         timespec t{};
         clock_gettime(CLOCK_MONOTONIC, &t);
         return t.tv_sec * nanoseconds_per_second + t.tv_nsec;
     }
+    SHIFTRIG_TRUSTED_END
     void sleep_until(std::int64_t time) const noexcept {
         const timespec t{time / nanoseconds_per_second, time % nanoseconds_per_second};
         clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);

@@ -62,6 +62,7 @@ class Endpoint {
 
     // Encodes and queues a message for the send thread; false and counted if the queue is full. `channel`
     // must live as long as the endpoint. Loop only.
+    SHIFTRIG_TRUSTED_BEGIN  // generated encoders of fixed-size types, and a post that wakes the send thread
     template <class Type>
     bool send(const char* channel, const Type& message) SHIFTRIG_REALTIME {
         Outgoing* slot = outgoing_.claim();
@@ -75,6 +76,7 @@ class Endpoint {
         sem_post(&to_send_);
         return true;
     }
+    SHIFTRIG_TRUSTED_END
 
     // The oldest message received, null if there is none; pop() gives it back. Loop only.
     const Message* front() const SHIFTRIG_REALTIME { return incoming_.front(); }

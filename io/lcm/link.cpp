@@ -25,11 +25,13 @@ namespace {
 
 constexpr int messages_per_tick = 64;  // a flood of messages shall not hold up the loop
 
+SHIFTRIG_TRUSTED_BEGIN  // clock_gettime does not enter the kernel
 std::int64_t utime() SHIFTRIG_REALTIME {
     timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     return std::int64_t{now.tv_sec} * 1'000'000 + now.tv_nsec / 1000;
 }
+SHIFTRIG_TRUSTED_END
 
 template <class Type>
 Subscription subscription(const char* name) {
@@ -125,7 +127,7 @@ struct LcmLink::Data {
     void start_controller(SignalTable& signals, const std::string& url);
 
     bool plausible(const clutch_command_t& message) const noexcept;
-    void take(const Message& message, std::int64_t now_ns, SignalTable& signals) noexcept;
+    void take(const Message& message, std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME;
     template <class Type>
     bool believe(const Message& bytes, std::int64_t now_ns, Type& message) noexcept;
     void apply_command(const clutch_command_t& message, SignalTable& signals) noexcept;
@@ -260,7 +262,7 @@ bool LcmLink::Data::plausible(const clutch_command_t& message) const noexcept {
     return true;
 }
 
-void LcmLink::Data::take(const Message& bytes, std::int64_t now_ns, SignalTable& signals) noexcept {
+void LcmLink::Data::take(const Message& bytes, std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME {
     if (options.role == Role::controller) {
         if (bytes.subscription == at_speeds) {
             speeds_t message;
