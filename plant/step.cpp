@@ -44,14 +44,19 @@ void integrate(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME
 // its parabola (shafts that swing within the step). Returns the fraction reached; `end` is there.
 double approach(Work& w, const Mode& mode, const Crossing& crossing, double done, double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 4;
-    constexpr double close_enough = 1e-5;  // of the margins at both ends
+    // Of the margins at both ends. A reversal of power may be missed by more, but had better lie behind: what is
+    // left of it is corrected.
+    const double close_enough = crossing.turns ? 1e-2 : 1e-5, beyond = crossing.turns ? 5e-3 : 0;
     double low = done, high = until;
-    double at_low = margin(w, crossing.device, w.scratch.begin), at_high = margin(w, crossing.device, w.scratch.end);
+    const auto left = [&](const Sample& s) {
+        return crossing.turns ? turning_margin(w, crossing.device, s) : margin(w, crossing.device, s);
+    };
+    double at_low = left(w.scratch.begin), at_high = left(w.scratch.end);
     const double size = std::fabs(at_low) + std::fabs(at_high);
-    double reached = done + crossing.theta * (until - done);
+    double reached = done + std::min(crossing.theta + beyond, 1.) * (until - done);
     for (int steps = 1;; ++steps) {
         integrate(w, mode, reached);
-        const double rest = margin(w, crossing.device, w.scratch.end);
+        const double rest = left(w.scratch.end);
         if (std::fabs(rest) <= close_enough * size || steps == most_steps) return reached;
         (rest > 0 ? low : high) = reached;
         (rest > 0 ? at_low : at_high) = rest;
@@ -104,9 +109,9 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
         // The new state acts from here on; where events are used up, or by choice, from the next step on.
         if (inside) {
-            change_state(w, first.device, s.begin);
+            if (!first.turns) change_state(w, first.device, s.begin);
             ++outputs.certificate.events;
-        } else if (first.device >= 0) {
+        } else if (first.device >= 0 && !first.turns) {
             change_all(w, *mode, s.begin);
             outputs.certificate.fall_backs += localise;
         }

@@ -415,6 +415,12 @@ double margin(const Work& w, int device, const Sample& s) SHIFTRIG_REALTIME {
     return slip_sign(state) * device_slip(w, device, s.z);
 }
 
+double turning_margin(const Work& w, int device, const Sample& s) SHIFTRIG_REALTIME {
+    const unsigned char state = w.contact[device];
+    const double sign = motion_sign(state);
+    return (s.torque[device] - loss_kink(mesh_of(w, device - w.model.pairs), sign)) * sign * loss_exponent(state);
+}
+
 Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, const Sample& end) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     Crossing first;
@@ -435,7 +441,20 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, const Sample& 
             theta = parabola_root(margin(w, k, begin), sign * device_slip(w, k, begin.rate) * length,
                                   margin(w, k, end));
         }
-        if (first.device < 0 || theta < first.theta) first = {k, theta};
+        if (first.device < 0 || theta < first.theta) first = {k, theta, false};
+    }
+    if (mode.tree || mode.ledger_parts == 1) return first;
+    const double negligible = 1e-6 * torque_scale(w, end);
+    for (int k = m.pairs; k < m.contact_bytes; ++k) {
+        if (w.contact[k] == stuck || mode.bound[k] || !mesh_of(w, k - m.pairs).lossy()) continue;
+        const double g1 = turning_margin(w, k, end);
+        if (g1 >= -negligible) continue;
+        if (!middle_known) internal_torques(w, mode, w.scratch.half);
+        middle_known = true;
+        const double g0 = turning_margin(w, k, begin), gm = turning_margin(w, k, w.scratch.half);
+        if (g0 <= 0) continue;  // just turned: it is within rounding of the point where both losses agree
+        const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
+        if (first.device < 0 || theta < first.theta) first = {k, theta, true};
     }
     return first;
 }

@@ -14,6 +14,7 @@ Mode& settle(Work& work, Sample& sample, bool complete = false) SHIFTRIG_REALTIM
 struct Crossing {
     int device = -1;   // contact byte: pair or pairs + mesh; −1: nobody changes
     double theta = 1;  // where between begin and end, 0…1
+    bool turns = false;  // a mesh's power turns round; it does not come to rest
 };
 
 // The first device whose state does not hold until the end of the part just computed: a slip speed that
@@ -23,6 +24,8 @@ Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, const Sampl
 // How far from changing the device is at the sample: slip in the direction of its motion, or capacity left.
 // Negative: its state does not hold.
 double margin(const Work& work, int device, const Sample& sample) SHIFTRIG_REALTIME;
+// The same for a mesh whose power may turn round: its torque beyond the point where both losses agree.
+double turning_margin(const Work& work, int device, const Sample& sample) SHIFTRIG_REALTIME;
 
 // Changes the state of one device at the sample, and with it of all that its closing brings to rest.
 void change_state(Work& work, int device, Sample& sample) SHIFTRIG_REALTIME;
