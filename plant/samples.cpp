@@ -39,7 +39,7 @@ ScratchData::ScratchData(const ModelData& m) {
     for (std::size_t i = 0; i < std::size(samples); ++i) place_sample(m, *samples[i], buffer.data() + i * size);
     loads.resize(static_cast<std::size_t>(m.pairs));
     const auto bytes = static_cast<std::size_t>(m.contact_bytes);
-    for (auto* list : {&before, &trial, &changed, &violations}) list->assign(bytes, 0);
+    for (auto* list : {&before, &trial, &release, &changed, &violations}) list->assign(bytes, 0);
     family.assign(bytes, 0);
     const auto longest = static_cast<std::size_t>(std::max({m.states_padded, padded(m.torques), 3 * m.forces}));
     for (auto* vector : {&vector_a, &vector_b, &vector_c}) vector->assign(longest, 0.);

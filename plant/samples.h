@@ -71,7 +71,7 @@ struct ScratchData {
     Sample begin, end;           // live with the operators
     Sample half, late, middle;
     std::vector<PairLoad> loads;
-    std::vector<unsigned char> before, trial, changed, violations;  // contact bytes
+    std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
     std::vector<signed char> family;
     std::vector<double> vector_a, vector_b, vector_c;  // padded masses, states, torques or 3 × forces
     std::vector<double> torque_copy;

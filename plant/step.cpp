@@ -44,13 +44,12 @@ void integrate(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME
 // its parabola (shafts that swing within the step). Returns the fraction reached; `end` is there.
 double approach(Work& w, const Mode& mode, const Crossing& crossing, double done, double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 4;
-    // Of the margins at both ends. A reversal of power may be missed by more, but had better lie behind: what is
-    // left of it is corrected.
-    const double close_enough = crossing.turns ? 1e-2 : 1e-5, beyond = crossing.turns ? 5e-3 : 0;
+    // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
+    // beyond.
+    const bool by_itself = crossing.change != Change::state;
+    const double close_enough = by_itself ? 1e-2 : 1e-5, beyond = by_itself ? 3e-3 : 0;
     double low = done, high = until;
-    const auto left = [&](const Sample& s) {
-        return crossing.turns ? turning_margin(w, crossing.device, s) : margin(w, crossing.device, s);
-    };
+    const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
     double at_low = left(w.scratch.begin), at_high = left(w.scratch.end);
     const double size = std::fabs(at_low) + std::fabs(at_high);
     double reached = done + std::min(crossing.theta + beyond, 1.) * (until - done);
@@ -62,7 +61,7 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
         (rest > 0 ? at_low : at_high) = rest;
         // Secant, kept off the ends of the bracket.
         const double share = at_low > 0 ? at_low / (at_low - at_high) : 0.5;
-        reached = low + std::clamp(share, 0.01, 0.99) * (high - low);
+        reached = low + std::clamp(share + beyond, 0.01, 0.99) * (high - low);
     }
 }
 
@@ -109,9 +108,9 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
         // The new state acts from here on; where events are used up, or by choice, from the next step on.
         if (inside) {
-            if (!first.turns) change_state(w, first.device, s.begin);
+            if (first.change == Change::state) change_state(w, first.device, s.begin);
             ++outputs.certificate.events;
-        } else if (first.device >= 0 && !first.turns) {
+        } else if (first.device >= 0 && first.change == Change::state) {
             change_all(w, *mode, s.begin);
             outputs.certificate.fall_backs += localise;
         }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plant/dense.h"
 #include "plant/ledger.h"
@@ -200,17 +201,17 @@ double find_family(Work& w, const Mode& mode, int leader, signed char* part) {
     return mobility;
 }
 
-// A family is let go together, each member with the sign that the motion gives it. Released if, going one
-// way with its own consistent losses, the family accelerates that way. Returns true if it went.
-bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
+// A family is let go together, each member with the sign that the motion gives it. It goes if, one way and with
+// its own consistent losses, it accelerates that way. Returns the acceleration towards the better of both ways
+// beyond rounding, positive if it goes, with the states it then has in scratch.release; the sample is as before.
+double release_drive(Work& w, const Mode& mode, int leader, Sample& s) {
     const ModelData& m = w.model;
     ScratchData& scratch = w.scratch;
     signed char* part = scratch.family.data();
     const double mobility = find_family(w, mode, leader, part);
-    if (mobility == 0) return false;
+    if (mobility == 0) return -1;
 
     const double threshold = 1e-10 * torque_scale(w, s) * mobility * mobility;
-    const double needed = s.torque[m.pairs + m.meshes + leader];
     unsigned char* trial = scratch.trial.data();
     std::copy(s.torque, s.torque + m.torques, scratch.torque_copy.data());
     // To set it moving, the load must overcome what its pairs can hold, not what they pass on sliding.
@@ -219,33 +220,42 @@ bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
     for (int k = 0; k < m.pairs; ++k) {
         if (part[k] != 0) s.sliding[k] = std::max(s.sliding[k], s.holding[k]);
     }
+    double best = -std::numeric_limits<double>::infinity();
     for (const double direction : {1., -1.}) {
         std::copy(w.contact, w.contact + m.contact_bytes, trial);
         for (int k = 0; k < m.contact_bytes; ++k) {
             if (part[k] == 0) continue;
             const double sign = direction * part[k];
-            trial[k] = k < m.pairs ? slipping(sign) : moving(sign, scratch.torque_copy[static_cast<std::size_t>(k)] * sign < 0 ? -1 : 1);
+            const int x = scratch.torque_copy[static_cast<std::size_t>(k)] * sign < 0 ? -1 : 1;
+            trial[k] = k < m.pairs ? slipping(sign) : moving(sign, x);
         }
         contact_forces(w, trial, s);
         const Mode& moving_mode = find_directions(w, trial, s);
         if (trial[m.pairs + leader] == stuck) continue;
         sample_rate(w, moving_mode, s);
-        const double acceleration = slip_of(mesh_of(w, leader).motion(), s.rate);
-        if (acceleration * direction > threshold) {
-            for (int k = 0; k < m.meshes; ++k) {
-                if (part[m.pairs + k] == 0) continue;
-                log_event(w, EventKind::mesh_releases, m.pairs + k, s.at.time, s.torque[m.pairs + k], needed, 0);
-            }
-            std::copy(trial, trial + m.contact_bytes, w.contact);
-            std::copy(sliding, sliding + m.pairs, s.sliding);
-            contact_forces(w, w.contact, s);
-            return true;
+        const double drive = slip_of(mesh_of(w, leader).motion(), s.rate) * direction - threshold;
+        if (drive > best) {
+            best = drive;
+            std::copy(trial, trial + m.contact_bytes, scratch.release.data());
         }
     }
     std::copy(sliding, sliding + m.pairs, s.sliding);
     contact_forces(w, w.contact, s);
     std::copy(scratch.torque_copy.begin(), scratch.torque_copy.end(), s.torque);
-    return false;
+    return best;
+}
+
+bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
+    if (release_drive(w, mode, leader, s) <= 0) return false;
+    const ModelData& m = w.model;
+    const double held = s.torque[m.pairs + m.meshes + leader];
+    for (int k = m.pairs; k < m.contact_bytes; ++k) {
+        if (w.scratch.family[static_cast<std::size_t>(k)] == 0) continue;
+        log_event(w, EventKind::mesh_releases, k, s.at.time, s.torque[k], held, 0);
+    }
+    std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);
+    contact_forces(w, w.contact, s);
+    return true;
 }
 
 bool release_stuck_meshes(Work& w, const Mode& mode, Sample& s) {
@@ -408,20 +418,33 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
     }
 }
 
-double margin(const Work& w, int device, const Sample& s) SHIFTRIG_REALTIME {
+namespace {
+
+double margin(const Work& w, int device, const Sample& s) {
     const unsigned char state = w.contact[device];
     if (device >= w.model.pairs) return motion_sign(state) * device_slip(w, device, s.z);
     if (state == locked) return s.holding[device] - std::fabs(s.torque[device]);
     return slip_sign(state) * device_slip(w, device, s.z);
 }
 
-double turning_margin(const Work& w, int device, const Sample& s) SHIFTRIG_REALTIME {
+double turning_margin(const Work& w, int device, const Sample& s) {
     const unsigned char state = w.contact[device];
     const double sign = motion_sign(state);
     return (s.torque[device] - loss_kink(mesh_of(w, device - w.model.pairs), sign)) * sign * loss_exponent(state);
 }
 
-Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, const Sample& end) SHIFTRIG_REALTIME {
+}  // namespace
+
+double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Sample& s) SHIFTRIG_REALTIME {
+    switch (crossing.change) {
+        case Change::state: return margin(w, crossing.device, s);
+        case Change::turn: return turning_margin(w, crossing.device, s);
+        case Change::release: return -release_drive(w, mode, crossing.device - w.model.pairs, s);
+    }
+    return 0;
+}
+
+Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     Crossing first;
     bool rates_known = false, middle_known = false;
@@ -441,7 +464,15 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, const Sample& 
             theta = parabola_root(margin(w, k, begin), sign * device_slip(w, k, begin.rate) * length,
                                   margin(w, k, end));
         }
-        if (first.device < 0 || theta < first.theta) first = {k, theta, false};
+        if (first.device < 0 || theta < first.theta) first = {k, theta, Change::state};
+    }
+    for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
+        const int leader = mode.rows[r] - m.pairs - m.meshes;
+        const double drive = release_drive(w, mode, leader, end);
+        if (drive <= 0) continue;
+        const double before = std::min(release_drive(w, mode, leader, begin), 0.);
+        const double theta = before / (before - drive);
+        if (first.device < 0 || theta < first.theta) first = {m.pairs + leader, theta, Change::release};
     }
     if (mode.tree || mode.ledger_parts == 1) return first;
     const double negligible = 1e-6 * torque_scale(w, end);
@@ -454,7 +485,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, const Sample& 
         const double g0 = turning_margin(w, k, begin), gm = turning_margin(w, k, w.scratch.half);
         if (g0 <= 0) continue;  // just turned: it is within rounding of the point where both losses agree
         const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
-        if (first.device < 0 || theta < first.theta) first = {k, theta, true};
+        if (first.device < 0 || theta < first.theta) first = {k, theta, Change::turn};
     }
     return first;
 }

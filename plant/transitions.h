@@ -11,21 +11,26 @@ namespace shiftrig::plant::detail {
 // and internal torques of the settled mode in the sample. `complete`: forces and torques are there already.
 Mode& settle(Work& work, Sample& sample, bool complete = false) SHIFTRIG_REALTIME;
 
+enum class Change {
+    state,    // a pair opens or closes, a mesh comes to rest
+    turn,     // the power through a mesh turns round
+    release,  // a stuck mesh goes
+};
+
 struct Crossing {
     int device = -1;   // contact byte: pair or pairs + mesh; −1: nobody changes
     double theta = 1;  // where between begin and end, 0…1
-    bool turns = false;  // a mesh's power turns round; it does not come to rest
+    Change change = Change::state;
 };
 
 // The first device whose state does not hold until the end of the part just computed: a slip speed that
-// changes sign ([Algin] eq. (13)), a torque above the static capacity (eq. (12)).
-Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, const Sample& end) SHIFTRIG_REALTIME;
+// changes sign ([Algin] eq. (13)), a torque above the static capacity (eq. (12)). Where shafts are so stiff that
+// they swing within the step, reversals of power are looked for as well; elsewhere correct_directions() does.
+Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME;
 
-// How far from changing the device is at the sample: slip in the direction of its motion, or capacity left.
-// Negative: its state does not hold.
-double margin(const Work& work, int device, const Sample& sample) SHIFTRIG_REALTIME;
-// The same for a mesh whose power may turn round: its torque beyond the point where both losses agree.
-double turning_margin(const Work& work, int device, const Sample& sample) SHIFTRIG_REALTIME;
+// How far from its change the device is at the sample: slip in the direction of its motion, capacity left, torque
+// beyond the point where both losses of a mesh agree, what a stuck mesh lacks to go. Negative: behind it.
+double crossing_margin(Work& work, const Mode& mode, const Crossing& crossing, Sample& sample) SHIFTRIG_REALTIME;
 
 // Changes the state of one device at the sample, and with it of all that its closing brings to rest.
 void change_state(Work& work, int device, Sample& sample) SHIFTRIG_REALTIME;
