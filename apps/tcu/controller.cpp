@@ -139,6 +139,7 @@ void Controller::driving(const Sensors& s, Commands& c) noexcept {
     } else if (next != gear_) {
         enter(Mode::shift);
         shift_.begin(*cal_, s, gear_, next);
+        engine_before_ = s.engine_speed;
     }
 }
 
@@ -180,11 +181,12 @@ void Controller::shift(const Sensors& s, Commands& c) noexcept {
     }
 }
 
-// After a shift the speed asked for comes down until the engine pushes no more: from there on the driver's throttle would
-// have it no slower.
+// After a shift the speed asked for comes down until the engine pushes no more, or until it is the speed that the engine had
+// before: from there on the driver's throttle would have it no slower.
 double Controller::give_back_engine(const Sensors& s) noexcept {
     if (engine_request_ == 0 || mode_ != Mode::driving || s.engine_torque <= 0) return 0;
-    return std::max(0.0, engine_request_ - cal_->shift.engine_return * cal_->period);
+    const double request = engine_request_ - cal_->shift.engine_return * cal_->period;
+    return request > engine_before_ ? request : 0;
 }
 
 // ---- limp ---------------------------------------------------------------------------------------------------

@@ -74,6 +74,7 @@ class Controller {
     double launch_torque_ = 0;    // capacity asked for [Nm]
     double pressure_ = 0;         // commanded to the gear's clutch in launch and driving [Pa]
     double engine_request_ = 0;   // asked of the engine [rad/s]; 0: nothing
+    double engine_before_ = 0;    // its speed when the shift began, under the driver's throttle [rad/s]
     Shift shift_;
 };
 
