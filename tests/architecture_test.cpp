@@ -61,7 +61,7 @@ TEST(Architecture, PlantKnowsNoClockThreadFileOrSocket) {
 }
 
 TEST(Architecture, PlantAndTimeDispatchNothingThroughVirtualFunctions) {
-    const std::regex word(R"(\bvirtual\b)");
+    const std::regex word(R"(\bvirtual\b)"), text(R"("[^"]*")");
     for (const std::string room : {"plant", "rt"})
         for (const auto& entry : fs::recursive_directory_iterator(fs::path(SHIFTRIG_SOURCE_DIR) / room)) {
             if (entry.path().extension() != ".h" && entry.path().extension() != ".cpp") continue;
@@ -69,7 +69,7 @@ TEST(Architecture, PlantAndTimeDispatchNothingThroughVirtualFunctions) {
             int number = 0;
             for (std::string line; std::getline(in, line);) {
                 ++number;
-                const std::string code = line.substr(0, line.find("//"));
+                const std::string code = std::regex_replace(line.substr(0, line.find("//")), text, "");
                 EXPECT_FALSE(std::regex_search(code, word)) << entry.path().string() << ":" << number;
             }
         }

@@ -12,7 +12,9 @@ ScenarioRun run_scenario(const io::ScenarioFile& scenario, const Choices& choice
     options.loop.period = rig.setup().tick_ns;
     options.loop.pace = choices.lockstep ? rt::Pace::lockstep : rt::Pace::free;
     options.loop.slots = std::llround(scenario.duration * 1e9 / static_cast<double>(options.loop.period));
-    Collector collector(rig, options.loop.slots);
+    CollectorOptions room;
+    room.most_bytes = std::size_t{4} << 30;  // all signals of a quarter of an hour
+    Collector collector(rig, options.loop.slots, room);
     options.collector = &collector;
     Session session(rig, std::move(options));
 

@@ -97,7 +97,7 @@ TEST(Rig, TractorHeldOnASlopeCreepsLessThanANanometreInTenMinutes) {
 
 TEST(Rig, SilentControllerLeadsToTheSafeCommandWithin150MillisecondsAndBackAgain) {
     const auto result = run_scenario(inline_scenario(std::string(ploughing_in_f2) +
-                                                     "duration_s: 4\ncontroller: {silent: [{from_s: 1, until_s: 2}]}\n"));
+                                                     "duration_s: 8\ncontroller: {silent: [{from_s: 1, until_s: 2}]}\n"));
     const auto& run = result.run;
     const auto& safe = column(run, "rig.safe_command");
     const auto& f2 = column(run, "clutch.F2.pressure_command");
@@ -159,7 +159,8 @@ TEST(Rig, PedalReleasesTheMainClutchWhateverTheControllerSays) {
     const auto result = run_scenario(inline_scenario(
         std::string(ploughing_in_f2) + "duration_s: 2\ntimeline:\n  - {at_s: 0.5, over_s: 0.1, driver.clutch_pedal: 1}\n"));
     EXPECT_EQ(column(result.run, "clutch.Fc.release_command").back(), 1);
-    EXPECT_EQ(column(result.run, "clutch.Fc.state").back(), 2);
+    EXPECT_LT(column(result.run, "clutch.Fc.capacity").back(), 1);  // [Nm]: the lag of the release never ends
+    EXPECT_NE(column(result.run, "clutch.Fc.state").back(), 0);
 }
 
 TEST(Rig, ScenarioThatSetsAnOutputIsRefusedWithItsPlace) {
