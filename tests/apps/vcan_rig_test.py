@@ -105,10 +105,14 @@ class VcanRig(unittest.TestCase):
 
     def test_a_command_made_by_hand_moves_the_clutch(self):
         with tempfile.NamedTemporaryFile("r", suffix=".csv") as table:
-            process = rig(SOURCE + "/config/tractor.yaml", "--duration", "4", "--csv", table.name)
-            time.sleep(1.5)
-            subprocess.run(["cansend", "vcan0", "18FF1003#0000E02E00000760"], check=True)
-            result = result_of(process)
+            with Candump() as dump:
+                process = rig(SOURCE + "/config/tractor.yaml", "--duration", "6", "--csv", table.name)
+                while not any(i == "18FF2080" for _, i, _ in dump.frames()):  # the rig has begun
+                    time.sleep(0.05)
+                for _ in range(10):
+                    subprocess.run(["cansend", "vcan0", "18FF1003#0000E02E00000760"], check=True)
+                    time.sleep(0.02)
+                result = result_of(process)
             pressures = [float(row["clutch.F2.pressure_pa"]) for row in csv.DictReader(table)]
         self.assertEqual(pressures[0], 0)
         self.assertGreater(max(pressures), 0.8e5, "the piston has left its stop")
