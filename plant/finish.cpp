@@ -155,8 +155,7 @@ double torque_residual(Work& w, const Mode& mode, const Sample& s) {
         } else if (unknown < m.pairs + m.meshes) {
             const auto k = static_cast<std::size_t>(unknown - m.pairs);
             const Mesh& mesh = m.structure.meshes[k];
-            const bool resting = mode.bound[unknown] || mode.key[unknown] == 0;
-            const int x = resting ? 0 : mode.key[unknown] == 2 ? -1 : 1;
+            const int x = mode.key[unknown] == 0 ? 0 : mode.key[unknown] == 2 ? -1 : 1;
             take(m.mesh_slip[k], s.torque[unknown]);
             // û in place of u: the difference lies on the loss column.
             take(m.mesh_loss[k], (1 - mesh.force_ratio(x) / mesh.ratio) * s.torque[unknown]);

@@ -179,8 +179,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int*) SHIFTRI
             weight = pair.nominal_capacity;
         } else if (unknown < m.pairs + m.meshes) {
             const Mesh& mesh = s.meshes[static_cast<std::size_t>(unknown - m.pairs)];
-            const bool at_rest = mode.bound[m.pairs + unknown - m.pairs] != 0 || mesh_key(unknown - m.pairs) == 0;
-            const int x = at_rest ? 0 : mesh_key(unknown - m.pairs) == 2 ? -1 : 1;
+            const int x = mesh_key(unknown - m.pairs) == 0 ? 0 : mesh_key(unknown - m.pairs) == 2 ? -1 : 1;
             length = scaled_column(m, mesh.column(mesh.force_ratio(x)), c);
         } else {
             const Mesh& mesh = s.meshes[static_cast<std::size_t>(unknown - m.pairs - m.meshes)];

@@ -50,15 +50,17 @@ double loss_kink(const Mesh& mesh, double s) {
     return s * tau;
 }
 
-// Lossy meshes that others hold at rest do not move: they carry torque without loss.
+// Lossy meshes that stuck ones hold are stuck with them. What clutches hold at rest (a gear before a closed brake)
+// may lean on its loss instead, see lean_on_losses().
 bool rest_bound_meshes(const Work& w, const Mode& mode, unsigned char* contact) {
     bool changed = false;
     for (int k = 0; k < w.model.meshes; ++k) {
         unsigned char& state = contact[w.model.pairs + k];
-        if (state != stuck && mode.bound[w.model.pairs + k] && mesh_of(w, k).lossy()) {
-            state = stuck;
-            changed = true;
-        }
+        const unsigned char bound = mode.bound[w.model.pairs + k];
+        if (state == stuck || bound == 0 || !mesh_of(w, k).lossy()) continue;
+        if (!mode.tree && (bound & by_active_set)) continue;
+        state = stuck;
+        changed = true;
     }
     return changed;
 }
@@ -131,25 +133,61 @@ bool engage_and_release(Work& w, Sample& s) {
     return changed;
 }
 
-// The locked pair that is loaded furthest beyond its static capacity.
-int most_overloaded(const Work& w, const Sample& s) {
-    int worst = -1;
-    double highest = overload;
+// The locked pair that is loaded furthest beyond its static capacity, and how far.
+struct Overload {
+    int pair = -1;
+    double use = overload;  // torque over capacity
+};
+Overload most_overloaded(const Work& w, const Sample& s) {
+    Overload worst;
     for (int k = 0; k < w.model.pairs; ++k) {
         if (w.contact[k] != locked) continue;
         const double use = std::fabs(s.torque[k]) / s.holding[k];
-        if (use > highest) {
-            highest = use;
-            worst = k;
-        }
+        if (use > worst.use) worst = {k, use};
     }
     return worst;
 }
 
-void open(Work& w, int pair, Sample& s) {
+// Meshes that leaned on their losses begin anew: which way they go now, release_drive() finds out.
+void open(Work& w, const Mode& mode, int pair, Sample& s) {
+    for (int k = w.model.pairs; k < w.model.contact_bytes; ++k) {
+        if ((mode.bound[k] & by_active_set) && mesh_of(w, k - w.model.pairs).lossy()) w.contact[k] = stuck;
+    }
     log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], s.holding[pair], 0);
     w.contact[pair] = slipping(s.torque[pair]);
     contact_forces(w, w.contact, s);
+}
+
+// A lossy mesh at rest between closed pairs takes any loss torque up to the limit of either direction: the machine
+// stands as long as some split of the torques is within everybody's limits. So before a pair opens, the mesh
+// that relieves the worst-loaded pair most is set to its limit. Says whether one was.
+bool lean_on_losses(Work& w, const Mode& mode, double use, Sample& s) {
+    const ModelData& m = w.model;
+    if (mode.tree) return false;
+    unsigned char* trial = w.scratch.trial.data();
+    bool found = false, tried = false;
+    for (int k = m.pairs; k < m.contact_bytes; ++k) {
+        if (!(mode.bound[k] & by_active_set) || !mesh_of(w, k - m.pairs).lossy()) continue;
+        for (const double direction : {1., -1.}) {
+            if (w.contact[k] != stuck && motion_sign(w.contact[k]) == direction) continue;
+            if (!tried) std::copy(s.torque, s.torque + m.torques, w.scratch.torque_copy.data());
+            tried = true;
+            std::copy(w.contact, w.contact + m.contact_bytes, trial);
+            trial[k] = moving(direction, w.scratch.torque_copy[static_cast<std::size_t>(k)] * direction < 0 ? -1 : 1);
+            contact_forces(w, trial, s);
+            find_directions(w, trial, s);
+            const double relieved = most_overloaded(w, s).use;
+            if (relieved >= use * (1 - 1e-9)) continue;
+            use = relieved;
+            found = true;
+            std::copy(trial, trial + m.contact_bytes, w.scratch.release.data());
+        }
+    }
+    if (!tried) return false;
+    if (found) std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);
+    std::copy(w.scratch.torque_copy.begin(), w.scratch.torque_copy.end(), s.torque);
+    contact_forces(w, w.contact, s);
+    return found;
 }
 
 // ---- stuck meshes -----------------------------------------------------------------------------------
@@ -408,13 +446,10 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
     for (int passes = 0;; ++passes, complete = false) {
         Mode& mode = find_directions(w, w.contact, s, complete);
         if (passes > 2 * w.model.contact_bytes + 2) return mode;
-        const int overloaded = most_overloaded(w, s);
-        if (overloaded >= 0) {
-            open(w, overloaded, s);
-            continue;
-        }
         if (release_stuck_meshes(w, mode, s)) continue;
-        return mode;
+        const Overload worst = most_overloaded(w, s);
+        if (worst.pair < 0) return mode;
+        if (!lean_on_losses(w, mode, worst.use, s)) open(w, mode, worst.pair, s);
     }
 }
 
@@ -492,7 +527,8 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
 
 void change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
     if (device < w.model.pairs && w.contact[device] == locked) {
-        open(w, device, s);
+        const Mode& mode = find_mode(w.model, w.operators, w.contact, w.scratch);
+        if (!lean_on_losses(w, mode, overload, s)) open(w, mode, device, s);
     } else {
         close(w, device, s);
     }
@@ -505,7 +541,7 @@ void change_all(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         const bool closed = k < w.model.pairs ? w.contact[k] == locked : w.contact[k] == stuck;
         if (!list[k]) continue;
         if (k < w.model.pairs && closed) {
-            open(w, k, s);
+            open(w, find_mode(w.model, w.operators, w.contact, w.scratch), k, s);
         } else if (!closed) {
             close(w, k, s);
         }

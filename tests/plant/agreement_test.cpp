@@ -173,7 +173,7 @@ TEST(KinematicMethod, AgreesWithTheMethodOfInternalTorques) {
 }
 
 // Machines that one millisecond does not resolve, or that are settled differently; docs/validation.md names the reasons.
-constexpr std::uint64_t open_seeds[] = {1, 2, 4, 16, 21, 24, 58};
+constexpr std::uint64_t open_seeds[] = {24};
 
 TEST(RandomSystems, AFixedSubsetAgreesWithTheReferenceSolver) {
     const ComparisonOptions options;
@@ -189,7 +189,7 @@ TEST(RandomSystems, AFixedSubsetAgreesWithTheReferenceSolver) {
             << describe(system.description);
         agreeing += c.outcome == Outcome::agrees;
     }
-    EXPECT_GE(agreeing, 52);
+    EXPECT_GE(agreeing, 58);
 }
 
 TEST(RandomSystems, AreTheSameForTheSameSeed) {

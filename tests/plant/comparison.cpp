@@ -325,4 +325,25 @@ std::string describe(const Description& d) {
     return s;
 }
 
+std::string timelines(const Description& d, const ComparisonOptions& options, double until) {
+    std::string s = "reference:\n";
+    for (const auto& change : run_reference(d, options).changes) {
+        if (change.time < until) s += text("  t=%.7f %s %s\n", change.time, change.device.c_str(), change.what.c_str());
+    }
+    s += "plant:\n";
+    const Model model = Model::build(d, {.step_size = 1e-3 / options.steps_per_sample});
+    Operators operators(model);
+    State state(model);
+    Scratch scratch(model);
+    const Inputs inputs(model);
+    Outputs outputs(model);
+    while (state.time() < until) {
+        step(model, operators, state, inputs, outputs, scratch);
+        for (int e = 0; e < std::min(outputs.event_count, Outputs::event_capacity); ++e) {
+            s += "  " + explain(model, outputs.events[static_cast<std::size_t>(e)]) + "\n";
+        }
+    }
+    return s;
+}
+
 }  // namespace shiftrig

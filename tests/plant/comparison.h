@@ -57,4 +57,7 @@ Comparison compare(const RandomSystem& system, std::uint64_t seed, const Compari
 // The description as text, for a finding.
 std::string describe(const plant::Description& description);
 
+// The changes of state of both runs up to `until` [s], one after the other, in words.
+std::string timelines(const plant::Description& description, const ComparisonOptions& options, double until);
+
 }  // namespace shiftrig

@@ -18,15 +18,22 @@ using namespace shiftrig;
 struct Arguments {
     long count = 100, jobs = 1;
     std::uint64_t seed = 1;
+    std::vector<std::uint64_t> seeds;  // instead of count and seed
     ComparisonOptions options;
     bool verbose = false;
 };
 
 const char usage[] =
-    "usage: shiftrig_random_systems [--count N] [--seed S] [--seconds T] [--jobs J] [--substeps K] "
+    "usage: shiftrig_random_systems [--count N] [--seed S | --seeds A,B,…] [--seconds T] [--jobs J] [--substeps K] "
     "[--verbose]\n"
-    "  systems S … S+N−1, each simulated for T seconds at 1 ms / K; --verbose prints each that does not "
-    "agree\n";
+    "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --verbose prints each that does "
+    "not agree\n";
+
+std::vector<std::uint64_t> numbers(const char* list) {
+    std::vector<std::uint64_t> found;
+    for (char* end; *list; list = *end ? end + 1 : end) found.push_back(std::strtoull(list, &end, 10));
+    return found;
+}
 
 bool parse(int argc, char** argv, Arguments& a) {
     for (int i = 1; i < argc; ++i) {
@@ -41,6 +48,8 @@ bool parse(int argc, char** argv, Arguments& a) {
             a.count = std::atol(value);
         else if (key == "--seed")
             a.seed = std::strtoull(value, nullptr, 10);
+        else if (key == "--seeds")
+            a.seeds = numbers(value);
         else if (key == "--seconds")
             a.options.seconds = std::atof(value);
         else if (key == "--substeps")
@@ -50,6 +59,7 @@ bool parse(int argc, char** argv, Arguments& a) {
         else
             return false;
     }
+    if (!a.seeds.empty()) a.count = static_cast<long>(a.seeds.size());
     return a.count > 0 && a.jobs > 0 && a.options.seconds > 0.01;
 }
 
@@ -68,7 +78,8 @@ int main(int argc, char** argv) {
     long fall_backs = 0, events = 0;
     const auto work = [&] {
         for (long i; (i = next++) < arguments.count;) {
-            const std::uint64_t seed = arguments.seed + static_cast<std::uint64_t>(i);
+            const std::uint64_t seed = arguments.seeds.empty() ? arguments.seed + static_cast<std::uint64_t>(i)
+                                                               : arguments.seeds[static_cast<std::size_t>(i)];
             const RandomSystem system = random_system(seed, arguments.options.seconds);
             Comparison c;
             try {
@@ -92,7 +103,10 @@ int main(int argc, char** argv) {
                         static_cast<unsigned long long>(seed), name(c.outcome), c.worst, c.worst_speed,
                         c.worst_signal.c_str(), c.worst_time, c.fall_backs, system.traits.c_str());
             for (const auto& line : c.broken) std::printf("    %s\n", line.c_str());
-            if (arguments.verbose) std::fputs(describe(system.description).c_str(), stdout);
+            if (arguments.verbose) {
+                std::fputs(describe(system.description).c_str(), stdout);
+                std::fputs(timelines(system.description, arguments.options, c.worst_time + 2e-3).c_str(), stdout);
+            }
             std::fflush(stdout);
         }
     };

@@ -164,7 +164,8 @@ bool Solver::settle_meshes(When when) {
         if (consistent(trial, torques)) {
             const double overload =
                 std::max(1.0 + overload_tolerance, worst_overload(when, torques, trial, nullptr));
-            if (overload < best_overload * (1 - 1e-12) ||
+            // An event is located where the present combination is overloaded by no more than the tolerances.
+            if (overload < best_overload - 1e-13 ||
                 (overload <= best_overload && differing < best_changes)) {
                 best = trial;
                 best_overload = overload;
@@ -365,8 +366,13 @@ Sample Solver::sample(When when) {
     s.dissipated = energy_.dissipated;
     s.stored = stored_energy();
     s.unique = !resting && responses_.of(mode).redundancy == 0 && responses_.of(mode).sound;
-    for (std::size_t m = 0; m < system_.meshes.size(); ++m)
-        if (mode.at_rest[m] && mode.mesh[m] != Hold::held) s.unique = false;
+    // A lossy mesh that others hold at rest takes any loss within its limits.
+    const Matrix& projector = responses_.of(mode).projector;
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
+        const auto& mesh = system_.meshes[m];
+        if (!mesh.lossy() || mode.mesh[m] == Hold::held) continue;
+        if ((projector.transpose() * mesh.relative).norm() < 1e-8 * mesh.relative.norm()) s.unique = false;
+    }
     return s;
 }
 
