@@ -25,7 +25,7 @@ inline void differences(const TreePaths& t, const double* __restrict speed,
 }
 
 void shaft_torques(const TreePaths& t, const double* speed, const double* twist, double* rate, double* passed,
-                   double* torque) noexcept {
+                   double* torque) SHIFTRIG_REALTIME {
     const double* __restrict q = speed;
     const double* __restrict psi = twist;
     double* __restrict through = passed;
@@ -184,7 +184,7 @@ inline void substitute(const TreePaths& t, const double* __restrict lower,
 
 void stage(const TreePaths& t, const StageSums& s, const double* momentum, const double* twist, double weight,
            const double* inverse, const double* lower, double* work, double* star_twist, double* speed,
-           double* rate, double* torque) noexcept {
+           double* rate, double* torque) SHIFTRIG_REALTIME {
     double* const star_momentum = torque;  // until N takes its place
     if (s.count == 1) stage_start<1>(t, s, momentum, twist, weight, star_momentum, star_twist, work);
     if (s.count == 2) stage_start<2>(t, s, momentum, twist, weight, star_momentum, star_twist, work);
@@ -208,7 +208,7 @@ void stage(const TreePaths& t, const StageSums& s, const double* momentum, const
     for (int g = 0; g < groups; ++g) shaft[g] = (mass[g] * right[g] - shaft[g]) * inverse_weight;
 }
 
-void finish(const TreePaths& t, const FinalSums& s, double* speed, double* twist) noexcept {
+void finish(const TreePaths& t, const FinalSums& s, double* speed, double* twist) SHIFTRIG_REALTIME {
     double* __restrict q = speed;
     double* __restrict psi = twist;
     const double* __restrict f0 = s.force[0], * __restrict f1 = s.force[1], * __restrict f2 = s.force[2], * __restrict f3 = s.force[3];
@@ -225,7 +225,7 @@ void finish(const TreePaths& t, const FinalSums& s, double* speed, double* twist
     }
 }
 
-double middle(const TreePaths& t, const MiddleSums& s, double* speed, double* rate) noexcept {
+double middle(const TreePaths& t, const MiddleSums& s, double* speed, double* rate) SHIFTRIG_REALTIME {
     double* __restrict q = speed;
     const double eighth = s.h / 8;
     const double *q0 = s.speed[0], *q1 = s.speed[1], *n0 = s.torque[0], *n1 = s.torque[1], *f0 = s.force[0],

@@ -15,6 +15,16 @@ bool matters_for_shifts(std::string_view name) {
     return false;
 }
 
+// Within the reserve nothing is allocated.
+SHIFTRIG_TRUSTED_BEGIN
+template <class Event>
+bool keep(std::vector<Event>& kept, const Event& event) SHIFTRIG_REALTIME {
+    if (kept.size() == kept.capacity()) return false;
+    kept.push_back(event);
+    return true;
+}
+SHIFTRIG_TRUSTED_END
+
 }  // namespace
 
 Collector::Collector(const Rig& rig, std::int64_t ticks, const CollectorOptions& options) {
@@ -47,14 +57,8 @@ void Collector::take(const Rig& rig) SHIFTRIG_REALTIME {
         ++left_out_;
     }
     events_left_out_ += rig.plant_events_not_kept();
-    const auto keep = [this](auto& kept, const auto& events) {
-        for (const auto& event : events) {
-            if (kept.size() < kept.capacity()) kept.push_back(event);  // within the reserve: nothing is allocated
-            else ++events_left_out_;
-        }
-    };
-    keep(plant_events_, rig.plant_events());
-    keep(rig_events_, rig.rig_events());
+    for (const auto& event : rig.plant_events()) events_left_out_ += !keep(plant_events_, event);
+    for (const auto& event : rig.rig_events()) events_left_out_ += !keep(rig_events_, event);
 }
 
 analysis::Run Collector::finish(const Rig& rig) {

@@ -220,7 +220,7 @@ void Rig::note(RigEventKind kind, int signal, double value) SHIFTRIG_REALTIME {
 
 bool Rig::wait_for_answer(std::int64_t timeout_ns) { return buses_.wait_for_answer(sim_time_ns(), signals_, timeout_ns); }
 
-std::span<const double> Rig::rig_values() const noexcept {
+std::span<const double> Rig::rig_values() const SHIFTRIG_REALTIME {
     return std::span(signals_.value).subspan(inputs_.value.size() + outputs_.value.size());
 }
 

@@ -79,7 +79,7 @@ class Rig {
     }
     std::span<const double> input_values() const noexcept { return inputs_.value; }
     std::span<const double> output_values() const noexcept { return outputs_.value; }
-    std::span<const double> rig_values() const noexcept;  // everything in the table behind inputs and outputs
+    std::span<const double> rig_values() const SHIFTRIG_REALTIME;  // everything in the table behind inputs and outputs
     std::vector<plant::Signal> rig_signals() const;       // the same, by name
 
     const plant::Model& model() const noexcept { return model_; }

@@ -145,11 +145,11 @@ Calibration parse_calibration(const std::string& text, const std::string& path) 
     return calibration;
 }
 
-double Calibration::pressure_for(double torque) const noexcept {
+double Calibration::pressure_for(double torque) const SHIFTRIG_REALTIME {
     return std::clamp(clutch.kiss_pressure + torque / clutch.torque_per_pressure, clutch.touch_pressure, clutch.full_pressure);
 }
 
-double Calibration::full_load(double engine_speed) const noexcept {
+double Calibration::full_load(double engine_speed) const SHIFTRIG_REALTIME {
     const auto& curve = machine.full_load;
     auto after = std::find_if(curve.begin(), curve.end(), [&](const auto& point) { return point.first > engine_speed; });
     if (after == curve.begin()) return curve.front().second;

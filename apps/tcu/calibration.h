@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "plant/realtime.h"
+
 namespace shiftrig::tcu {
 
 inline constexpr int clutch_count = 5;  // F1, F2, F3, F4, FR
@@ -90,8 +92,8 @@ struct Calibration {
         std::string mapping;  // what the frames of a CAN bus mean; read relative to this file
     } bus;
 
-    double pressure_for(double torque) const noexcept;      // touch pressure … full pressure [Pa]
-    double full_load(double engine_speed) const noexcept;   // [Nm]
+    double pressure_for(double torque) const SHIFTRIG_REALTIME;      // touch pressure … full pressure [Pa]
+    double full_load(double engine_speed) const SHIFTRIG_REALTIME;   // [Nm]
 };
 
 // Throws io::InputError naming file, line, key and rule.

@@ -2,7 +2,7 @@
 
 namespace shiftrig::tcu {
 
-Commands Controller::step(const Sensors& s) noexcept {
+Commands Controller::step(const Sensors& s) SHIFTRIG_REALTIME {
     Commands c;
     in_mode_ += cal_->period;
     if (s.lever_alive && s.lever != failed_lever_) failed_lever_ = 0;
@@ -34,7 +34,7 @@ Commands Controller::step(const Sensors& s) noexcept {
     return c;
 }
 
-void Controller::enter(Mode mode) noexcept {
+void Controller::enter(Mode mode) SHIFTRIG_REALTIME {
     mode_ = mode;
     in_mode_ = 0;
     slipping_ = 0;
@@ -42,13 +42,13 @@ void Controller::enter(Mode mode) noexcept {
 }
 
 // Nothing is known yet but pressures: what is closed stays closed.
-void Controller::hold_as_found(const Sensors& s, Commands& c) noexcept {
+void Controller::hold_as_found(const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
     for (std::size_t i = 0; i < clutch_count; ++i)
         if (s.pressure[i] > 0.8 * cal_->clutch.full_pressure) c.pressure[i] = cal_->clutch.full_pressure;
 }
 
 // The first believable picture: a controller that (re)starts finds the machine as it is.
-void Controller::listen(const Sensors& s) noexcept {
+void Controller::listen(const Sensors& s) SHIFTRIG_REALTIME {
     enter(Mode::neutral);
     if (!s.pressures_alive) return;
     for (const int gear : {-1, 1, 2, 3, 4}) {
@@ -62,7 +62,7 @@ void Controller::listen(const Sensors& s) noexcept {
 
 // ---- neutral ------------------------------------------------------------------------------------------------
 
-void Controller::neutral(const Sensors& s, Commands& c) noexcept {
+void Controller::neutral(const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
     const int gear = choice_.starting(*cal_, s);
     if (may_start_off(s, gear)) {
         begin_launch(s, gear);
@@ -70,7 +70,7 @@ void Controller::neutral(const Sensors& s, Commands& c) noexcept {
     }
 }
 
-bool Controller::may_start_off(const Sensors& s, int gear) const noexcept {
+bool Controller::may_start_off(const Sensors& s, int gear) const SHIFTRIG_REALTIME {
     if (gear == 0 || s.lever == failed_lever_) return false;
     const double against = gear > 0 ? -s.output_speed : s.output_speed;
     return against <= cal_->launch.highest_reversal_speed && s.engine_speed >= cal_->stop.relaunch_speed &&
@@ -79,7 +79,7 @@ bool Controller::may_start_off(const Sensors& s, int gear) const noexcept {
 
 // ---- launch: the gear's clutch, or the main clutch, slips until both sides run together -------------------------
 
-void Controller::begin_launch(const Sensors& s, int gear) noexcept {
+void Controller::begin_launch(const Sensors& s, int gear) SHIFTRIG_REALTIME {
     enter(Mode::launch);
     gear_ = gear;
     fill_ = Fill{};
@@ -90,7 +90,7 @@ void Controller::begin_launch(const Sensors& s, int gear) noexcept {
                       std::abs(s.output_speed) < cal_->limp.sensor_zero;
 }
 
-void Controller::launch(const Sensors& s, Commands& c) noexcept {
+void Controller::launch(const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
     const auto clutch = static_cast<std::size_t>(clutch_of(gear_));
     const auto& launch = cal_->launch;
 
@@ -124,7 +124,7 @@ void Controller::launch(const Sensors& s, Commands& c) noexcept {
 
 // ---- driving: one clutch locked -----------------------------------------------------------------------------
 
-void Controller::driving(const Sensors& s, Commands& c) noexcept {
+void Controller::driving(const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
     pressure_ = std::min(cal_->clutch.full_pressure, pressure_ + cal_->clutch.closing_rate * cal_->period);
     c.pressure[static_cast<std::size_t>(clutch_of(gear_))] = pressure_;
 
@@ -143,12 +143,12 @@ void Controller::driving(const Sensors& s, Commands& c) noexcept {
     }
 }
 
-bool Controller::would_stall(const Sensors& s) const noexcept {
+bool Controller::would_stall(const Sensors& s) const SHIFTRIG_REALTIME {
     const bool braking = s.brake >= cal_->stop.brake_applied || s.parking_brake;
     return s.engine_speed + engine_slowing_ * cal_->stop.look_ahead < (braking ? cal_->stop.brake_speed : cal_->stop.stall_guard_speed);
 }
 
-void Controller::watch_engine(const Sensors& s) noexcept {
+void Controller::watch_engine(const Sensors& s) SHIFTRIG_REALTIME {
     constexpr double share = 0.3;  // of each new difference: a filter of some three cycles
     const double change = (s.engine_speed - engine_speed_) / cal_->period;
     engine_slowing_ = std::min(0.0, engine_slowing_ + share * (change - engine_slowing_));
@@ -157,7 +157,7 @@ void Controller::watch_engine(const Sensors& s) noexcept {
 
 // ---- shift --------------------------------------------------------------------------------------------------
 
-void Controller::shift(const Sensors& s, Commands& c) noexcept {
+void Controller::shift(const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
     const bool up = shift_.to() > shift_.from();
     if (s.lever * gear_ <= 0 || would_stall(s)) {
         enter(Mode::neutral);
@@ -183,7 +183,7 @@ void Controller::shift(const Sensors& s, Commands& c) noexcept {
 
 // After a shift the speed asked for comes down until the engine pushes no more, or until it is the speed that the engine had
 // before: from there on the driver's throttle would have it no slower.
-double Controller::give_back_engine(const Sensors& s) noexcept {
+double Controller::give_back_engine(const Sensors& s) SHIFTRIG_REALTIME {
     if (engine_request_ == 0 || mode_ != Mode::driving || s.engine_torque <= 0) return 0;
     const double request = engine_request_ - cal_->shift.engine_return * cal_->period;
     return request > engine_before_ ? request : 0;
@@ -193,7 +193,7 @@ double Controller::give_back_engine(const Sensors& s) noexcept {
 
 // Speeds, engine and lever must be heard; and in gear, a shaft that reads as standing while the other turns is a lost
 // sensor, not a slip.
-bool Controller::trusts(const Sensors& s) noexcept {
+bool Controller::trusts(const Sensors& s) SHIFTRIG_REALTIME {
     if (!s.speeds_alive || !s.engine_alive || !s.lever_alive) return false;
     if (gear_ == 0 || mode_ == Mode::launch || std::abs(slip_of(*cal_, s, gear_)) < cal_->limp.slip) return true;
     const bool one_stands = std::abs(s.input_speed) < cal_->limp.sensor_zero ||
@@ -201,7 +201,7 @@ bool Controller::trusts(const Sensors& s) noexcept {
     return !one_stands;
 }
 
-void Controller::limp(const Sensors& s, Commands& c) noexcept {
+void Controller::limp(const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
     const bool let_go = (s.lever_alive && s.lever == 0) || (s.engine_alive && would_stall(s));
     if (let_go) gear_ = 0;
     if (gear_ != 0) {

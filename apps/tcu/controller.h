@@ -28,7 +28,7 @@ class Controller {
 
     // One control cycle. Never throws, allocates or blocks. While the mode is `listening` they are better not sent,
     // unless somebody waits for them.
-    Commands step(const Sensors& sensors) noexcept;
+    Commands step(const Sensors& sensors) SHIFTRIG_REALTIME;
 
     Mode mode() const noexcept { return mode_; }
 
@@ -41,21 +41,21 @@ class Controller {
     }
 
   private:
-    void listen(const Sensors& s) noexcept;
-    void hold_as_found(const Sensors& s, Commands& c) noexcept;
-    void neutral(const Sensors& s, Commands& c) noexcept;
-    void launch(const Sensors& s, Commands& c) noexcept;
-    void driving(const Sensors& s, Commands& c) noexcept;
-    void shift(const Sensors& s, Commands& c) noexcept;
-    void limp(const Sensors& s, Commands& c) noexcept;
+    void listen(const Sensors& s) SHIFTRIG_REALTIME;
+    void hold_as_found(const Sensors& s, Commands& c) SHIFTRIG_REALTIME;
+    void neutral(const Sensors& s, Commands& c) SHIFTRIG_REALTIME;
+    void launch(const Sensors& s, Commands& c) SHIFTRIG_REALTIME;
+    void driving(const Sensors& s, Commands& c) SHIFTRIG_REALTIME;
+    void shift(const Sensors& s, Commands& c) SHIFTRIG_REALTIME;
+    void limp(const Sensors& s, Commands& c) SHIFTRIG_REALTIME;
 
-    void enter(Mode mode) noexcept;
-    double give_back_engine(const Sensors& s) noexcept;
-    void begin_launch(const Sensors& s, int gear) noexcept;
-    bool may_start_off(const Sensors& s, int gear) const noexcept;
-    void watch_engine(const Sensors& s) noexcept;
-    bool would_stall(const Sensors& s) const noexcept;
-    bool trusts(const Sensors& s) noexcept;
+    void enter(Mode mode) SHIFTRIG_REALTIME;
+    double give_back_engine(const Sensors& s) SHIFTRIG_REALTIME;
+    void begin_launch(const Sensors& s, int gear) SHIFTRIG_REALTIME;
+    bool may_start_off(const Sensors& s, int gear) const SHIFTRIG_REALTIME;
+    void watch_engine(const Sensors& s) SHIFTRIG_REALTIME;
+    bool would_stall(const Sensors& s) const SHIFTRIG_REALTIME;
+    bool trusts(const Sensors& s) SHIFTRIG_REALTIME;
 
     const Calibration* cal_;
     GearChoice choice_;

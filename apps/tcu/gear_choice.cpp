@@ -10,7 +10,7 @@ void count_down(double& time, double period) { time = std::max(0.0, time - perio
 
 }  // namespace
 
-void GearChoice::observe(const Calibration& cal, const Sensors& s) noexcept {
+void GearChoice::observe(const Calibration& cal, const Sensors& s) SHIFTRIG_REALTIME {
     if (!observed_) torque_ = s.engine_torque;
     observed_ = true;
     torque_ += (s.engine_torque - torque_) * cal.period / (cal.choice.torque_filter + cal.period);
@@ -21,7 +21,7 @@ void GearChoice::observe(const Calibration& cal, const Sensors& s) noexcept {
     lugging_ = lugs ? lugging_ + cal.period : 0;
 }
 
-int GearChoice::starting(const Calibration& cal, const Sensors& s) const noexcept {
+int GearChoice::starting(const Calibration& cal, const Sensors& s) const SHIFTRIG_REALTIME {
     if (s.lever < 0) return -1;
     const int highest = std::min(s.lever, highest_gear);
     if (std::abs(s.output_speed) < cal.limp.sensor_zero) return std::min(highest, cal.launch.highest_gear);
@@ -34,7 +34,7 @@ int GearChoice::starting(const Calibration& cal, const Sensors& s) const noexcep
     return best;
 }
 
-int GearChoice::next(const Calibration& cal, const Sensors& s, int gear) const noexcept {
+int GearChoice::next(const Calibration& cal, const Sensors& s, int gear) const SHIFTRIG_REALTIME {
     if (s.lever == 0 || s.lever * gear < 0) return 0;
     if (gear < 0 || pause_ > 0) return gear;
     const auto input_speed_in = [&](int to) { return s.input_speed * ratio(cal, to) / ratio(cal, gear); };
@@ -47,12 +47,12 @@ int GearChoice::next(const Calibration& cal, const Sensors& s, int gear) const n
     return gear + 1;
 }
 
-bool GearChoice::engine_bears(const Calibration& cal, const Sensors& s, int from, int to) const noexcept {
+bool GearChoice::engine_bears(const Calibration& cal, const Sensors& s, int from, int to) const SHIFTRIG_REALTIME {
     const double step = ratio(cal, from) / ratio(cal, to);  // > 1 upwards
     return torque_ * step <= cal.choice.upshift_torque_margin * cal.full_load(s.input_speed / step);
 }
 
-void GearChoice::shifted(const Calibration& cal, bool refuse_upshifts) noexcept {
+void GearChoice::shifted(const Calibration& cal, bool refuse_upshifts) SHIFTRIG_REALTIME {
     pause_ = cal.shift.pause;
     lugging_ = 0;
     if (refuse_upshifts) refused_for_ = cal.choice.refusal_time;

@@ -13,16 +13,16 @@ namespace shiftrig::tcu {
 class GearChoice {
   public:
     // Once a cycle, while the sensors are to be trusted: keeps the estimates up to date.
-    void observe(const Calibration& cal, const Sensors& s) noexcept;
+    void observe(const Calibration& cal, const Sensors& s) SHIFTRIG_REALTIME;
     // The gear to start off in, at rest or in motion; 0 if the lever wants none.
-    int starting(const Calibration& cal, const Sensors& s) const noexcept;
+    int starting(const Calibration& cal, const Sensors& s) const SHIFTRIG_REALTIME;
     // The gear to go to from `gear`; equal to it if nothing is to be done, 0 to open the driveline.
-    int next(const Calibration& cal, const Sensors& s, int gear) const noexcept;
+    int next(const Calibration& cal, const Sensors& s, int gear) const SHIFTRIG_REALTIME;
     // A shift ended; if it failed, or the engine lugged, none upwards for the refusal time.
-    void shifted(const Calibration& cal, bool refuse_upshifts) noexcept;
+    void shifted(const Calibration& cal, bool refuse_upshifts) SHIFTRIG_REALTIME;
 
   private:
-    bool engine_bears(const Calibration& cal, const Sensors& s, int from, int to) const noexcept;
+    bool engine_bears(const Calibration& cal, const Sensors& s, int from, int to) const SHIFTRIG_REALTIME;
 
     bool observed_ = false;
     double torque_ = 0;        // filtered [Nm]

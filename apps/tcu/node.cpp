@@ -25,7 +25,7 @@ std::vector<int> statuses(const io::SignalTable& signals, std::initializer_list<
 }
 
 // Alive or a little late; silent, corrupt or never seen otherwise.
-bool heard(const std::vector<int>& statuses, const io::SignalTable& signals) noexcept {
+bool heard(const std::vector<int>& statuses, const io::SignalTable& signals) SHIFTRIG_REALTIME {
     for (const int status : statuses) {
         const double value = signals.value[static_cast<std::size_t>(status)];
         if (value != 1 && value != 2) return false;
@@ -94,7 +94,7 @@ void Node::find_signals() {
     last_rig_time_ns_ = -period_ns_;
 }
 
-Sensors Node::sense() const noexcept {
+Sensors Node::sense() const SHIFTRIG_REALTIME {
     const auto get = [&](int index) { return signals_.value[static_cast<std::size_t>(index)]; };
     Sensors s;
     s.engine_speed = get(at_.engine_speed);
@@ -115,7 +115,7 @@ Sensors Node::sense() const noexcept {
     return s;
 }
 
-void Node::say(const Sensors& sensors) noexcept {
+void Node::say(const Sensors& sensors) SHIFTRIG_REALTIME {
     const auto set = [&](int index, double value) {
         if (index >= 0) signals_.value[static_cast<std::size_t>(index)] = value;
     };
@@ -132,7 +132,7 @@ void Node::say(const Sensors& sensors) noexcept {
     set(at_.told_output_speed, sensors.output_speed);
 }
 
-void Node::tick(std::int64_t now_ns) noexcept {
+void Node::tick(std::int64_t now_ns) SHIFTRIG_REALTIME {
     if (lockstep_) now_ns = counted_ns_;
     bus_.receive(now_ns, signals_);
     const bool asked = bus_.question_pending();
@@ -145,12 +145,12 @@ void Node::tick(std::int64_t now_ns) noexcept {
     if (commands_.mode != Mode::listening || asked) bus_.send(now_ns, signals_);
 }
 
-void Node::restart() noexcept {
+void Node::restart() SHIFTRIG_REALTIME {
     controller_ = Controller(calibration_);
     commands_ = Commands{};
 }
 
-bool Node::cycle_is_due(bool asked, std::int64_t now_ns) noexcept {
+bool Node::cycle_is_due(bool asked, std::int64_t now_ns) SHIFTRIG_REALTIME {
     // LCM asks every tick, and says what time it is there; CAN asks once a cycle.
     const auto rig_time = bus_.rig_time_ns();
     const std::int64_t passed = rig_time.value_or(0) - last_rig_time_ns_;

@@ -51,9 +51,9 @@ class Node {
         int speed_request_enable, speed_request;
     };
     void find_signals();
-    Sensors sense() const noexcept;
-    void say(const Sensors& sensors) noexcept;
-    bool cycle_is_due(bool asked, std::int64_t now_ns) noexcept;
+    Sensors sense() const SHIFTRIG_REALTIME;
+    void say(const Sensors& sensors) SHIFTRIG_REALTIME;
+    bool cycle_is_due(bool asked, std::int64_t now_ns) SHIFTRIG_REALTIME;
 
     Calibration calibration_;
     Controller controller_;

@@ -2,7 +2,7 @@
 
 namespace shiftrig::tcu {
 
-void Shift::begin(const Calibration& cal, const Sensors& s, int from, int to) noexcept {
+void Shift::begin(const Calibration& cal, const Sensors& s, int from, int to) SHIFTRIG_REALTIME {
     *this = Shift{};
     from_ = from;
     to_ = to;
@@ -12,31 +12,31 @@ void Shift::begin(const Calibration& cal, const Sensors& s, int from, int to) no
     pulls_ = first_slip_ * s.engine_torque >= 0;  // T would drive the input away from its new speed
 }
 
-void Shift::enter(Phase phase) noexcept {
+void Shift::enter(Phase phase) SHIFTRIG_REALTIME {
     phase_ = phase;
     in_phase_ = 0;
 }
 
-void Shift::cancel() noexcept {
+void Shift::cancel() SHIFTRIG_REALTIME {
     const bool offgoing_holds = phase_ == Phase::fill || (pulls_ && phase_ == Phase::torque && handed_over_ < 0.5);
     if (offgoing_holds) enter(Phase::abandoned);
 }
 
-double Shift::slipping_capacity(const Calibration& cal, const Sensors& s, double slip) const noexcept {
+double Shift::slipping_capacity(const Calibration& cal, const Sensors& s, double slip) const SHIFTRIG_REALTIME {
     const double to_go = std::max(cal.shift.inertia_time - in_phase_, cal.shift.shortest_to_go);
     const double acceleration = -slip_of(cal, s, to_) / to_go;  // of the input, towards its new speed
     const double torque = s.engine_torque - cal.machine.input_inertia * acceleration;
     return std::max(0.0, std::copysign(1.0, slip) * torque);
 }
 
-double Shift::engine_speed_request(const Calibration& cal, const Sensors& s) const noexcept {
+double Shift::engine_speed_request(const Calibration& cal, const Sensors& s) const SHIFTRIG_REALTIME {
     const double new_speed = s.input_speed - slip_of(cal, s, to_);
     const bool leads_upwards = !pulls_ && (phase_ == Phase::inertia || phase_ == Phase::torque || phase_ == Phase::closing) &&
                                to_ < from_;
     return leads_upwards ? new_speed + cal.shift.engine_lead : 0;
 }
 
-void Shift::step(const Calibration& cal, const Sensors& s, Commands& c) noexcept {
+void Shift::step(const Calibration& cal, const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
     const auto on = static_cast<std::size_t>(clutch_of(to_)), off = static_cast<std::size_t>(clutch_of(from_));
     const double torque = std::abs(s.engine_torque);
     in_phase_ += cal.period;

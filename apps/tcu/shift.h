@@ -27,22 +27,22 @@ class Shift {
   public:
     enum class Phase { fill, torque, inertia, closing, finished, abandoned };
 
-    void begin(const Calibration& cal, const Sensors& s, int from, int to) noexcept;
+    void begin(const Calibration& cal, const Sensors& s, int from, int to) SHIFTRIG_REALTIME;
     // One cycle; writes the pressures of both clutches.
-    void step(const Calibration& cal, const Sensors& s, Commands& c) noexcept;
+    void step(const Calibration& cal, const Sensors& s, Commands& c) SHIFTRIG_REALTIME;
     // The driver changed his mind: while the offgoing clutch still holds, its gear is kept.
-    void cancel() noexcept;
+    void cancel() SHIFTRIG_REALTIME;
 
     int from() const noexcept { return from_; }
     int to() const noexcept { return to_; }
     Phase phase() const noexcept { return phase_; }
     // What the engine should run at now [rad/s]; 0: as the driver has it.
-    double engine_speed_request(const Calibration& cal, const Sensors& s) const noexcept;
+    double engine_speed_request(const Calibration& cal, const Sensors& s) const SHIFTRIG_REALTIME;
     bool over() const noexcept { return phase_ == Phase::finished || phase_ == Phase::abandoned; }
 
   private:
-    void enter(Phase phase) noexcept;
-    double slipping_capacity(const Calibration& cal, const Sensors& s, double slip) const noexcept;
+    void enter(Phase phase) SHIFTRIG_REALTIME;
+    double slipping_capacity(const Calibration& cal, const Sensors& s, double slip) const SHIFTRIG_REALTIME;
 
     int from_ = 0, to_ = 0;
     bool pulls_ = true;         // the oncoming clutch pulls; else the engine leads
