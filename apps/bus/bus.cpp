@@ -36,7 +36,8 @@ Bus::Bus(const std::string& name, const io::can::Mapping* mapping, io::SignalTab
     if (!name.starts_with("can:") && !name.starts_with("udpcan:"))
         throw io::InputError("bus " + name + ": unknown kind; it is inprocess, can:INTERFACE, udpcan:GROUP:PORT or lcm:URL");
     owned_.push_back(io::can::open_port(name, io::can::filters_of(*mapping, can_options(options).role)));
-    join_can(*owned_.back(), *mapping, signals, options, io::can::AddressClaim::claim);
+    wire_ = owned_.back().get();
+    join_can(*wire_, *mapping, signals, options, io::can::AddressClaim::claim);
     can_->claim_addresses();
 }
 
@@ -69,7 +70,7 @@ void Bus::join_can(io::can::CanPort& wire, const io::can::Mapping& mapping, io::
     can_.emplace(mapping, *port_, signals, can);
 }
 
-std::uint64_t Bus::messages_lost() const noexcept {
+std::uint64_t Bus::messages_lost() const SHIFTRIG_REALTIME {
     if (lcm_) return lcm_->messages_lost();
     const auto counters = port_->counters();
     return counters.send_dropped + counters.receive_dropped + counters.malformed;

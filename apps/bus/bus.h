@@ -62,6 +62,13 @@ class Bus {
         return lcm_ ? std::optional(lcm_->rig_time_ns()) : std::nullopt;
     }
 
+    // On a real wire: from the arrival of a command to the sending of the first message that reflects it [ns], one not
+    // yet taken; false if there is none.
+    bool next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME {
+        if (lcm_) return lcm_->next_command_latency(latency_ns);
+        return wire_ && wire_->next_command_latency(latency_ns);
+    }
+
     // A fault of the bus that began or ended since the last call.
     bool next_fault(io::can::FaultEvent& event) SHIFTRIG_REALTIME { return faulty_ && faulty_->next_event(event); }
 
@@ -73,7 +80,7 @@ class Bus {
     }
 
     const std::string& name() const noexcept { return name_; }
-    std::uint64_t messages_lost() const noexcept;          // known to be lost, either way
+    std::uint64_t messages_lost() const SHIFTRIG_REALTIME;   // known to be lost, either way
     std::vector<std::string> warnings() const;             // at start
     std::vector<std::string> summary() const;              // at the end, one line per message or channel that fared ill
     io::can::CanLink* can() noexcept { return can_ ? &*can_ : nullptr; }
@@ -85,6 +92,7 @@ class Bus {
     std::string name_;
     // Port upon port: the wire (unless it is an end of the in-process bus), its faults, a log replayed, a log written.
     std::vector<std::unique_ptr<io::can::CanPort>> owned_;
+    io::can::CanPort* wire_ = nullptr;  // the innermost, if it is a real one
     io::can::CanPort* port_ = nullptr;  // the outermost; null: LCM
     io::can::FaultyPort* faulty_ = nullptr;  // one of them, if there are faults
     std::optional<io::can::CanLink> can_;

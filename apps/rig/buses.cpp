@@ -93,7 +93,13 @@ bool Buses::wait_for_answer(std::int64_t now_ns, io::SignalTable& signals, std::
     return true;
 }
 
-std::uint64_t Buses::messages_lost() const noexcept {
+bool Buses::next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME {
+    for (auto& each : buses_)
+        if (each.next_command_latency(latency_ns)) return true;
+    return false;
+}
+
+std::uint64_t Buses::messages_lost() const SHIFTRIG_REALTIME {
     std::uint64_t lost = 0;
     for (const auto& each : buses_) lost += each.messages_lost();
     return lost;

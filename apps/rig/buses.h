@@ -55,7 +55,10 @@ class Buses {
     // Lockstep: waits until no bus awaits an answer any more.
     bool wait_for_answer(std::int64_t now_ns, io::SignalTable& signals, std::int64_t timeout_ns);
 
-    std::uint64_t messages_lost() const noexcept;
+    // See bus::Bus; of any bus.
+    bool next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME;
+
+    std::uint64_t messages_lost() const SHIFTRIG_REALTIME;
     std::vector<std::string> warnings() const;
     std::vector<std::string> summary() const;
     const tcu::Node* built_in() const noexcept { return node_.get(); }

@@ -13,6 +13,10 @@ SHIFTRIG_TRUSTED_BEGIN
 void call(const Hook& hook, Rig& rig, const rt::Tick& tick) SHIFTRIG_REALTIME {
     if (hook) hook(rig, tick);
 }
+
+std::span<const std::byte> bytes_of(const plant::State& state) SHIFTRIG_REALTIME {
+    return state.bytes();  // an address and a length
+}
 SHIFTRIG_TRUSTED_END
 
 }  // namespace
@@ -53,6 +57,7 @@ void Session::tick(const rt::Tick& t) SHIFTRIG_REALTIME {
     const std::int64_t ended = clock_.now();
     compute_ns_ = ended - began;
     rig_time_.record(compute_ns_);
+    for (std::int64_t latency; rig_.buses().next_command_latency(latency);) command_to_signal_.record(latency);
 
     if (options_.recording) record(t, began);
     if (options_.collector) options_.collector->take(rig_);
@@ -73,7 +78,7 @@ void Session::record(const rt::Tick& t, std::int64_t began) SHIFTRIG_REALTIME {
     r.events = rig_.plant_events();
     r.events_not_kept = rig_.plant_events_not_kept();
     r.certificate = rig_.certificate();
-    r.state = rig_.state().bytes();
+    r.state = bytes_of(rig_.state());
     r.overruns = loop_.report().overruns;
     r.messages_lost = static_cast<std::int64_t>(rig_.buses().messages_lost());
     r.wall_ns = began - started_ns_;

@@ -36,6 +36,9 @@ class Session {
     const rt::LoopReport& report() const noexcept { return loop_.report(); }  // whole when run() has returned
     // How long the rig's tick took, of the loop's step: receive, decide, step, send, without recording and showing.
     const rt::Histogram& rig_time() const noexcept { return rig_time_; }
+    // From the arrival of a command on a real wire to the sending of the first frame that reflects it: of all commands
+    // that one tick took, the oldest. Nothing on the in-process bus, which lives in simulated time.
+    const rt::Histogram& command_to_signal() const noexcept { return command_to_signal_; }
 
   private:
     void tick(const rt::Tick& tick) SHIFTRIG_REALTIME;
@@ -45,7 +48,7 @@ class Session {
     SessionOptions options_;
     rt::Loop<> loop_;
     rt::SteadyClock clock_;
-    rt::Histogram rig_time_;
+    rt::Histogram rig_time_, command_to_signal_;
     rt::Trace::Name span_tick_ = 0, span_record_ = 0;
     std::int64_t compute_ns_ = 0, started_ns_ = 0;
 };

@@ -172,6 +172,8 @@ void print_summary(const rig::Rig& rig, const rig::Session& session, const analy
     std::printf("%lld ticks, %.6g s simulated in %.3g s (%.3g times real time)\n", static_cast<long long>(report.executed),
                 rig.sim_time(), wall, wall > 0 ? rig.sim_time() / wall : 0);
     std::cout << describe(report) << "rig tick  " << session.rig_time().percentiles() << '\n';
+    if (session.command_to_signal().count() > 0)
+        std::cout << "command → signal  " << session.command_to_signal().percentiles() << '\n';
     if (!scorecard.shifts.empty()) std::cout << '\n' << analysis::to_text(scorecard);
 }
 
@@ -230,6 +232,7 @@ int run(const RunOptions& options) {
     if (options.json) {
         nlohmann::json result = result_json(rig, report, collected, scorecard);
         result["loop"]["rig_tick_ns"] = to_json(session.rig_time());
+        result["loop"]["command_to_signal_ns"] = to_json(session.command_to_signal());
         result["not_granted"] = to_json(refusals);
         std::cout << result.dump() << '\n';
     } else {

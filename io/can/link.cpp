@@ -158,6 +158,7 @@ void CanLink::Data::take(const Frame& frame, std::int64_t now_ns, SignalTable& s
     message->seen_good = true;
     message->last_was_bad = false;
     decode(*message, frame, signals);
+    if (message->command && command_arrived_ns == 0) command_arrived_ns = frame.timestamp_ns;
 
     const int index = static_cast<int>(message - received.data());
     if (options.role == Role::rig && index == answer && awaiting && message->last_counter == question_counter)
@@ -288,8 +289,13 @@ void CanLink::Data::encode(SentMessage& message, const SignalTable& signals) SHI
     if (message.checksum) message.checksum->codec.put(data, message.checksum->compute(message.frame));
 }
 
-bool CanLink::Data::put_on_bus(const SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME {
-    if (!message.by_transport) return port->send(now_ns, message.frame);
+bool CanLink::Data::put_on_bus(SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME {
+    if (!message.by_transport) {
+        message.frame.answers_ns = command_arrived_ns;
+        if (!port->send(now_ns, message.frame)) return false;
+        command_arrived_ns = 0;
+        return true;
+    }
     if (!network) return false;
     j1939::LongMessage whole;
     whole.pgn = pgn_of(message.frame.id);

@@ -120,7 +120,7 @@ struct CanLink::Data {
     void encode(SentMessage& message, const SignalTable& signals) SHIFTRIG_REALTIME;
     void transmit(SentMessage& message, std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REALTIME;
     bool due(SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME;
-    bool put_on_bus(const SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME;
+    bool put_on_bus(SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME;
     void hear_network(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME;
 
     CanPort* port;
@@ -147,6 +147,8 @@ struct CanLink::Data {
     bool awaiting = false, pending = false, asked_before = false;
     unsigned question_counter = 0;
     std::int64_t question_ns = 0;
+
+    std::int64_t command_arrived_ns = 0;  // stamp of the oldest command that no frame sent reflects yet; 0: none
 };
 
 // The part of an identifier that names what a frame is about, see link.cpp.

@@ -26,7 +26,7 @@ void CanLink::archive(Archive& a) {
     }
     a(d.started_receiving, d.started_sending, d.valid, d.receive_start_ns, d.last_send_ns);
     if (d.network) d.network->archive(a);
-    a(d.awaiting, d.pending, d.asked_before, d.question_counter, d.question_ns);
+    a(d.awaiting, d.pending, d.asked_before, d.question_counter, d.question_ns, d.command_arrived_ns);
 }
 
 }  // namespace shiftrig::io::can

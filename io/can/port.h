@@ -50,6 +50,12 @@ class CanPort {
         static_cast<void>(timeout_ns);
         return false;
     }
+    // Of a real wire: from the arrival of a command to the sending of the first frame that reflects it (Frame::answers_ns)
+    // [ns], one not yet taken; false if there is none.
+    virtual bool next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME {
+        static_cast<void>(latency_ns);
+        return false;
+    }
     // The bus as the user names it: `inprocess`, `can:vcan0`.
     virtual const std::string& description() const noexcept = 0;
 };

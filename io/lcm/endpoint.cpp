@@ -115,7 +115,7 @@ Endpoint::Endpoint(const std::string& url, const std::vector<Subscription>& subs
     for (auto& listener : listeners_) {
         const auto handler = [](const lcm_recv_buf_t* buffer, const char*, void* user) {
             const auto* self = static_cast<const Listener*>(user);
-            self->endpoint->take(*self, buffer->data, buffer->data_size);
+            self->endpoint->take(*self, buffer->data, buffer->data_size, buffer->recv_utime);
         };
         auto* handle = lcm_subscribe(lcm_, listener.subscription.channel, handler, &listener);
         if (!handle) {
@@ -138,7 +138,7 @@ Endpoint::~Endpoint() {
     sem_destroy(&arrived_);
 }
 
-void Endpoint::take(const Listener& listener, const void* data, std::size_t size) noexcept {
+void Endpoint::take(const Listener& listener, const void* data, std::size_t size, std::int64_t arrived_us) noexcept {
     std::uint64_t fingerprint = 0;
     for (std::size_t i = 0; i < 8 && i < size; ++i)
         fingerprint = fingerprint << 8 | static_cast<const std::uint8_t*>(data)[i];
@@ -154,6 +154,7 @@ void Endpoint::take(const Listener& listener, const void* data, std::size_t size
     }
     slot->subscription = listener.index;
     slot->size = size;
+    slot->arrived_ns = arrived_us * 1000;
     std::memcpy(slot->bytes.data(), data, size);
     incoming_.publish();
     received_.fetch_add(1, std::memory_order_relaxed);
@@ -171,6 +172,7 @@ void Endpoint::run_sender() {
         const int result =
             lcm_publish(lcm_, slot->channel, slot->bytes.data(), static_cast<unsigned>(slot->size));
         (result == 0 ? sent_ : send_failed_).fetch_add(1, std::memory_order_relaxed);
+        if (result == 0) command_latencies_.sent(slot->answers_ns);
         outgoing_.pop();
     }
 }

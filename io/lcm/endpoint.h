@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "io/command_latency.h"
 #include "io/input_error.h"
 #include "io/lcm/spsc_queue.h"
 #include "plant/realtime.h"
@@ -40,6 +41,7 @@ struct Subscription {
 struct Message {
     std::size_t subscription;  // index, as given to the constructor
     std::size_t size;
+    std::int64_t arrived_ns;  // when LCM took it from the network [ns of CLOCK_REALTIME, whole µs]
     std::array<std::byte, largest_message> bytes;
 };
 
@@ -61,16 +63,18 @@ class Endpoint {
     Endpoint& operator=(const Endpoint&) = delete;
 
     // Encodes and queues a message for the send thread; false and counted if the queue is full. `channel`
-    // must live as long as the endpoint. Loop only.
+    // must live as long as the endpoint; `answers_ns`: arrival of the command that this message is the first to
+    // reflect, 0 if of none. Loop only.
     SHIFTRIG_TRUSTED_BEGIN  // generated encoders of fixed-size types, and a post that wakes the send thread
     template <class Type>
-    bool send(const char* channel, const Type& message) SHIFTRIG_REALTIME {
+    bool send(const char* channel, const Type& message, std::int64_t answers_ns = 0) SHIFTRIG_REALTIME {
         Outgoing* slot = outgoing_.claim();
         if (!slot) {
             send_dropped_.fetch_add(1, std::memory_order_relaxed);
             return false;
         }
         slot->channel = channel;
+        slot->answers_ns = answers_ns;
         slot->size = message.encode(slot->bytes.data(), 0, static_cast<int>(slot->bytes.size()));
         outgoing_.publish();
         sem_post(&to_send_);
@@ -84,12 +88,18 @@ class Endpoint {
     // Blocks until front() has something, at most `timeout_ns`; false if it has not. Not for wall pace.
     bool wait(std::int64_t timeout_ns) noexcept;
 
+    // From the arrival of a command to the sending of the message that answers it [ns]; false if there is none.
+    bool next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME {
+        return command_latencies_.next(latency_ns);
+    }
+
     EndpointCounters counters() const SHIFTRIG_REALTIME;
     const std::string& url() const noexcept { return url_; }
 
   private:
     struct Outgoing {
         const char* channel;
+        std::int64_t answers_ns;
         int size;
         std::array<std::byte, largest_message> bytes;
     };
@@ -98,7 +108,7 @@ class Endpoint {
         std::size_t index;
         Subscription subscription;
     };
-    void take(const Listener& listener, const void* data, std::size_t size) noexcept;
+    void take(const Listener& listener, const void* data, std::size_t size, std::int64_t arrived_us) noexcept;
     void run_sender();
     void run_receiver();
 
@@ -107,6 +117,7 @@ class Endpoint {
     std::vector<Listener> listeners_;
     SpscQueue<Outgoing> outgoing_;
     SpscQueue<Message> incoming_;
+    CommandLatencies command_latencies_;
     sem_t to_send_, arrived_;
     std::atomic<bool> stop_{false};
     std::atomic<std::uint64_t> sent_{0}, send_failed_{0}, send_dropped_{0}, received_{0}, refused_{0},

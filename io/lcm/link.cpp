@@ -33,6 +33,13 @@ std::int64_t utime() SHIFTRIG_REALTIME {
 }
 SHIFTRIG_TRUSTED_END
 
+SHIFTRIG_TRUSTED_BEGIN  // a generated decoder of fixed-size types; its hash was computed when the link was built
+template <class Type>
+void decode(const Message& bytes, Type& message) SHIFTRIG_REALTIME {
+    message.decode(bytes.bytes.data(), 0, static_cast<int>(bytes.size));  // size and fingerprint are checked
+}
+SHIFTRIG_TRUSTED_END
+
 template <class Type>
 Subscription subscription(const char* name) {
     return {name, Type::getHash(), static_cast<std::size_t>(Type().getEncodedSize())};
@@ -106,6 +113,7 @@ struct LcmLink::Data {
     std::int64_t answered_seq = -1;  // rig: newest speeds_t.seq that a command has answered
     std::int64_t question_seq = -1;  // controller: newest speeds_t.seq seen
     std::int64_t rig_time_ns = 0;
+    std::int64_t command_arrived_ns = 0;  // rig: of the oldest command that no message sent reflects yet; 0: none
 
     enum Inbound : std::size_t { at_command, at_engine, at_transmission, at_driver };  // rig
     enum Heard : std::size_t { at_speeds, at_driver_input };                           // controller
@@ -117,7 +125,8 @@ struct LcmLink::Data {
     }
     template <class Type>
     void post(const char* name, Type& message) {
-        endpoint->send(name, message);
+        endpoint->send(name, message, command_arrived_ns);
+        command_arrived_ns = 0;
         ++message.seq;
     }
 
@@ -224,7 +233,7 @@ void LcmLink::receive(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTI
 template <class Type>
 bool LcmLink::Data::believe(const Message& bytes, std::int64_t now_ns, Type& message) noexcept {
     Channel& channel = channels[bytes.subscription];
-    message.decode(bytes.bytes.data(), 0, static_cast<int>(bytes.size));  // size and fingerprint are checked
+    decode(bytes, message);
     const bool silent = !channel.alive(now_ns, options.command_timeout_ns);
     if (message.seq < 0) {
         ++channel.report.implausible;
@@ -280,7 +289,9 @@ void LcmLink::Data::take(const Message& bytes, std::int64_t now_ns, SignalTable&
     switch (bytes.subscription) {
         case at_command: {
             clutch_command_t message;
-            if (believe(bytes, now_ns, message)) apply_command(message, signals);
+            if (!believe(bytes, now_ns, message)) break;
+            apply_command(message, signals);
+            if (command_arrived_ns == 0) command_arrived_ns = bytes.arrived_ns;
             break;
         }
         case at_engine: {
@@ -501,6 +512,10 @@ bool LcmLink::wait(std::int64_t timeout_ns) noexcept {
         if (data_->options.lockstep && awaiting_answer()) repeat_question();
     }
     return data_->endpoint->wait(timeout_ns);
+}
+
+bool LcmLink::next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME {
+    return data_->endpoint->next_command_latency(latency_ns);
 }
 
 std::int64_t LcmLink::rig_time_ns() const SHIFTRIG_REALTIME {

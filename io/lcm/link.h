@@ -71,6 +71,10 @@ class LcmLink {
     // side counts anything twice).
     void repeat_question() noexcept;
 
+    // rig: from the arrival of a command to the sending of the first message that reflects it [ns], one not yet taken;
+    // false if there is none.
+    bool next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME;
+
     // controller: simulated time of the newest speeds_t [ns].
     std::int64_t rig_time_ns() const SHIFTRIG_REALTIME;
     std::uint64_t messages_lost() const SHIFTRIG_REALTIME;  // all channels: gaps, dropped, failed to send

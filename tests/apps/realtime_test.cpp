@@ -8,10 +8,15 @@
 #include <atomic>
 #include <cerrno>
 #include <functional>
+#include <optional>
+#include <string>
 #include <thread>
 
 #include "apps/rig/choices.h"
 #include "apps/rig/session.h"
+#include "apps/tcu/calibration.h"
+#include "apps/tcu/node.h"
+#include "io/can/mapping.h"
 #include "io/recording/writer.h"
 #include "rt/thread.h"
 
@@ -65,13 +70,47 @@ struct Observed {
     std::int64_t executed = 0, skipped = 0;
     long allocations = 0, page_faults = 0;
     std::int64_t shifts_of_state = 0;  // events of the plant: the run was no idle one
+    std::int64_t commands_answered = 0;
+};
+
+struct Run {
+    std::string scenario = "plough_upshift.yaml";
+    double duration = 6;  // [s]
+    rt::Pace pace = rt::Pace::free;
+    std::string bus = "inprocess";
+};
+
+// The reference controller on the other end of a real bus, in a thread instead of a process.
+class ControllerBeside {
+  public:
+    explicit ControllerBeside(const std::string& bus)
+        : thread_([this, bus] {
+              const auto calibration = tcu::read_calibration(SHIFTRIG_SOURCE_DIR "/config/calibration/tractor.yaml");
+              const auto mapping = io::can::read_mapping(calibration.bus.mapping);
+              tcu::Node node(calibration, bus, &mapping, false);
+              for (const rt::SteadyClock clock; !stop_;) {
+                  node.bus().wait(1'000'000);
+                  node.tick(clock.now());
+              }
+          }) {}
+    ~ControllerBeside() {
+        stop_ = true;
+        thread_.join();
+    }
+
+  private:
+    std::atomic<bool> stop_{false};
+    std::thread thread_;
 };
 
 // A scenario in a thread set up as the plant thread of `shiftrig run` is, recorded, collected and traced.
-Observed observe(const std::string& scenario, double duration, rt::Pace pace, double factor = 1) {
+Observed observe(const Run& run) {
     Choices choices;
-    choices.scenario = std::string(SHIFTRIG_SOURCE_DIR) + "/config/scenarios/" + scenario;
+    choices.scenario = std::string(SHIFTRIG_SOURCE_DIR) + "/config/scenarios/" + run.scenario;
+    choices.buses = {run.bus};
     Rig rig(make_setup(choices));
+    std::optional<ControllerBeside> controller;
+    if (run.bus != "inprocess") controller.emplace(run.bus);
     rt::set_up_memory({});
     char path[] = "/tmp/realtime_test_XXXXXX";
     close(mkstemp(path));
@@ -80,9 +119,8 @@ Observed observe(const std::string& scenario, double duration, rt::Pace pace, do
         io::RecordingWriter recording(path);
         SessionOptions options;
         options.loop.period = rig.setup().tick_ns;
-        options.loop.slots = static_cast<std::int64_t>(duration * 1e9) / rig.setup().tick_ns;
-        options.loop.pace = pace;
-        options.loop.factor = factor;
+        options.loop.slots = static_cast<std::int64_t>(run.duration * 1e9) / rig.setup().tick_ns;
+        options.loop.pace = run.pace;
         Collector collector(rig, options.loop.slots);
         rt::Trace trace(20'000);
         options.recording = &recording;
@@ -111,6 +149,7 @@ Observed observe(const std::string& scenario, double duration, rt::Pace pace, do
         observed.allocations = allocations;
         observed.executed = session.report().executed;
         observed.skipped = session.report().skipped;
+        observed.commands_answered = session.command_to_signal().count();
         recording.end();
     }
     unlink(path);
@@ -118,12 +157,12 @@ Observed observe(const std::string& scenario, double duration, rt::Pace pace, do
 }
 
 // In a child, so that locked memory stays its own.
-Observed observe_in_child(const std::string& scenario, double duration, rt::Pace pace, double factor = 1) {
+Observed observe_in_child(const Run& run) {
     int channel[2];
     EXPECT_EQ(pipe(channel), 0);
     const pid_t child = fork();
     if (child == 0) {
-        const Observed observed = observe(scenario, duration, pace, factor);
+        const Observed observed = observe(run);
         const bool written = write(channel[1], &observed, sizeof observed) == sizeof observed;
         _exit(written ? 0 : 1);
     }
@@ -148,7 +187,7 @@ TEST(AllocationCounter, SeesAnAllocation) {
 }
 
 TEST(PlantThread, NeitherAllocatesNorFaultsInAnyTickOfAShift) {
-    const Observed observed = observe_in_child("plough_upshift.yaml", 6, rt::Pace::free);
+    const Observed observed = observe_in_child({});
     EXPECT_EQ(observed.executed, 6000);
     EXPECT_GT(observed.shifts_of_state, 3);
     EXPECT_EQ(observed.allocations, 0);
@@ -160,7 +199,7 @@ TEST(PlantThread, NeitherAllocatesNorFaultsInLaunchReversalFaultsAndTieUp) {
     for (const char* scenario :
          {"standing_start.yaml", "shuttle_reversal.yaml", "silent_controller.yaml", "stuck_closed.yaml",
           "overlapping_pressures.yaml", "speed_sensor_loss.yaml", "cold_oil.yaml"}) {
-        const Observed observed = observe_in_child(scenario, 5, rt::Pace::free);
+        const Observed observed = observe_in_child({.scenario = scenario, .duration = 5});
         EXPECT_EQ(observed.executed, 5000) << scenario;
         EXPECT_EQ(observed.allocations, 0) << scenario;
         EXPECT_EQ(observed.page_faults, 0) << scenario;
@@ -168,11 +207,26 @@ TEST(PlantThread, NeitherAllocatesNorFaultsInLaunchReversalFaultsAndTieUp) {
 }
 
 TEST(PlantThread, NeitherAllocatesNorFaultsAtWallPaceAndAccountsForEveryTick) {
-    const Observed observed = observe_in_child("plough_upshift.yaml", 3, rt::Pace::wall);
+    const Observed observed = observe_in_child({.duration = 3, .pace = rt::Pace::wall});
     EXPECT_EQ(observed.executed + observed.skipped, 3000);
     EXPECT_EQ(observed.allocations, 0);
     EXPECT_EQ(observed.page_faults, 0);
 }
+
+// Where this bus is to be had only (ctest knows where).
+class PlantThreadOnABus : public testing::TestWithParam<const char*> {};
+
+TEST_P(PlantThreadOnABus, NeitherAllocatesNorFaultsWhileTheControllerCommandsIt) {
+    const Observed observed = observe_in_child({.duration = 4, .pace = rt::Pace::wall, .bus = GetParam()});
+    EXPECT_EQ(observed.executed + observed.skipped, 4000);
+    EXPECT_GT(observed.commands_answered, 0);
+    EXPECT_EQ(observed.allocations, 0);
+    EXPECT_EQ(observed.page_faults, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Udpcan, PlantThreadOnABus, testing::Values("udpcan:239.74.163.2:43113?ttl=0"));
+INSTANTIATE_TEST_SUITE_P(Lcm, PlantThreadOnABus, testing::Values("lcm:udpm://239.255.76.67:7667?ttl=0"));
+INSTANTIATE_TEST_SUITE_P(Vcan, PlantThreadOnABus, testing::Values("can:vcan0"));
 
 }  // namespace
 }  // namespace shiftrig::rig

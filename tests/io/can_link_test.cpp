@@ -2,11 +2,15 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <numbers>
+#include <set>
+#include <vector>
 
 #include "io/can/codec.h"
 #include "io/can/inprocess.h"
@@ -427,6 +431,31 @@ TEST_F(Configuration, ABusThatCannotCarryTheMessagesIsAWarningAtStart) {
     EXPECT_NEAR(link.bus_load(), 135 / 250e3 / 0.5e-3, 1e-12);
     ASSERT_EQ(link.warnings().size(), 1U);
     EXPECT_NE(link.warnings()[0].find("250 kbit/s to 108 %"), std::string::npos) << link.warnings()[0];
+}
+
+// The stamp of the command travels with the first frame that is sent after it was taken, and with no other.
+TEST(CanLink, TheFirstFrameAfterACommandTellsWhenTheCommandArrived) {
+    TwoSides sides;
+    sides.run(0, 200);
+    std::array<Frame, 4096> seen;
+    sides.bus.end(2).receive(200 * kMs, seen);
+    sides.run(200, 300);
+    const std::size_t count = sides.bus.end(2).receive(300 * kMs, seen);
+    ASSERT_LT(count, seen.size());
+    std::vector<std::int64_t> commands, answered;
+    for (std::size_t i = 0; i < count; ++i) {
+        const bool command = seen[i].extended && (seen[i].id & 0x03FFFFFFU) == 0x00FF1003U;  // clutch command A
+        if (command) commands.push_back(seen[i].timestamp_ns);
+        if (seen[i].answers_ns == 0) continue;
+        EXPECT_EQ(seen[i].timestamp_ns - seen[i].answers_ns, kMs) << "taken in the tick after it was sent";
+        answered.push_back(seen[i].answers_ns);
+    }
+    ASSERT_EQ(commands.size(), 10U);
+    EXPECT_EQ(std::set<std::int64_t>(answered.begin(), answered.end()).size(), answered.size());
+    for (const std::int64_t command : commands) {
+        if (command == 299 * kMs) continue;  // its answer comes after the last frame seen here
+        EXPECT_EQ(std::count(answered.begin(), answered.end(), command), 1) << command;
+    }
 }
 
 TEST(CanLink, NothingIsAllocatedAfterConstruction) {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "io/can/open_port.h"
@@ -123,6 +124,31 @@ TEST(UdpPort, TwoPortsHearEachOtherButNotThemselves) {
     EXPECT_EQ(a->receive(0, frames), 0U);
     EXPECT_EQ(a->counters().sent, 500U);
     EXPECT_EQ(b->counters().received, 500U);
+}
+
+// Heard by one end, answered by the other: what lies between is told once, with the first frame that answers.
+TEST(UdpPort, TellsHowLongACommandWaitedForItsAnswer) {
+    const auto controller = open_port(kBus), rig = open_port(kBus);
+    Frame frame;
+    frame.id = 0x123;
+    ASSERT_TRUE(controller->send(0, frame));
+    const auto command = gather(*rig, 1);
+    ASSERT_EQ(command.size(), 1U);
+    const auto waits = std::chrono::milliseconds(5);
+    std::this_thread::sleep_for(waits);
+    const auto send = [&](std::int64_t answers_ns) {
+        frame.answers_ns = answers_ns;
+        ASSERT_TRUE(rig->send(0, frame));
+    };
+    send(command[0].timestamp_ns);
+    send(0);                                                      // answers nothing
+    send(12'345);                                                 // a stamp of another clock
+    send(command[0].timestamp_ns + 1'000'000'000'000);            // and one of the future
+    ASSERT_EQ(gather(*controller, 4).size(), 4U);
+    std::int64_t latency = 0;
+    ASSERT_TRUE(rig->next_command_latency(latency));
+    EXPECT_GE(latency, std::chrono::nanoseconds(waits).count());
+    EXPECT_FALSE(rig->next_command_latency(latency));
 }
 
 TEST(UdpPort, PythonCanReadsOurFramesAndWeReadPythonCans) {

@@ -90,6 +90,21 @@ TEST_F(Rig, CommandReachesTheSignalOfEachClutchInItsOwnUnit) {
     EXPECT_EQ(commands().good, 1u);
 }
 
+TEST_F(Rig, TimeFromACommandToTheFirstMessageThatReflectsItIsTold) {
+    deliver(channel::clutch_command, command(0, 8e5));
+    std::int64_t latency = 0;
+    EXPECT_FALSE(link.next_command_latency(latency)) << "nothing has been sent yet";
+    const auto waits = std::chrono::milliseconds(5);
+    std::this_thread::sleep_for(waits);
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    link.send(now, table);
+    while (!link.next_command_latency(latency) && std::chrono::steady_clock::now() < patience) std::this_thread::yield();
+    EXPECT_GE(latency, std::chrono::nanoseconds(waits).count());
+    link.send(now + ms, table);
+    ASSERT_TRUE(peer.wait(5'000 * ms));
+    EXPECT_FALSE(link.next_command_latency(latency)) << "told once";
+}
+
 TEST_F(Rig, EntryThatIsNotEnabledLeavesItsClutchAlone) {
     at(table, "clutch.F1.pressure_command") = 3e5;
     auto message = command(0, 12e5);
