@@ -151,10 +151,10 @@ void Node::restart() SHIFTRIG_REALTIME {
 }
 
 bool Node::cycle_is_due(bool asked, std::int64_t now_ns) SHIFTRIG_REALTIME {
-    // LCM asks every tick, and says what time it is there; CAN asks once a cycle.
+    // LCM asks every tick, and says what time it is there: cycles stand on the grid of that time, however late a question
+    // is heard. CAN asks once a cycle.
     const auto rig_time = bus_.rig_time_ns();
-    const std::int64_t passed = rig_time.value_or(0) - last_rig_time_ns_;
-    const bool new_cycle = !rig_time || passed >= period_ns_ || passed < 0;  // < 0: the rig began anew
+    const bool new_cycle = !rig_time || *rig_time / period_ns_ != last_rig_time_ns_ / period_ns_;
     const bool unasked_for_long = !lockstep_ && now_ns - last_cycle_ns_ >= 2 * period_ns_;
     if (!(asked && new_cycle) && !unasked_for_long) return false;
     last_rig_time_ns_ = rig_time.value_or(0);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <type_traits>
+#include <utility>
 
 #include "io/lcm/channels.h"
 #include "io/lcm/names.h"
@@ -79,14 +80,13 @@ struct Channel {
     }
 };
 
-// Whether something that is due every `period` is due now; late cycles are not caught up.
+// Whether something is due: at once, then whenever simulated time has passed a multiple of the period (or began anew). The
+// grid is that of time itself: both sides know it, and lateness does not move it.
 struct Cycle {
-    std::int64_t period_ns = 0, next_ns = INT64_MIN;
-    bool due(std::int64_t now_ns) noexcept {
-        if (now_ns < next_ns) return false;
-        next_ns =
-            next_ns == INT64_MIN || now_ns - next_ns >= period_ns ? now_ns + period_ns : next_ns + period_ns;
-        return true;
+    std::int64_t period_ns = 1, last = -1;
+    bool due(std::int64_t sim_time_ns) noexcept {
+        const std::int64_t now = sim_time_ns / period_ns;
+        return std::exchange(last, now) != now;
     }
 };
 
@@ -98,7 +98,7 @@ struct LcmLink::Data {
     std::vector<Channel> channels;  // by subscription
     std::vector<std::string> warnings;
     Names names;
-    int command_valid_signal = -1;
+    int command_valid_signal = -1, command_age_signal = -1;
     bool command_valid = true;
     std::int64_t first_receive_ns = INT64_MIN;
 
@@ -111,6 +111,7 @@ struct LcmLink::Data {
     engine_request_t engine{};
     transmission_status_t transmission{};
     std::int64_t answered_seq = -1;  // rig: newest speeds_t.seq that a command has answered
+    std::int64_t answered_ns = -1;   // and the simulated time at which that was asked; −1: none yet
     std::int64_t question_seq = -1;  // controller: newest speeds_t.seq seen
     std::int64_t rig_time_ns = 0;
     std::int64_t command_arrived_ns = 0;  // rig: of the oldest command that no message sent reflects yet; 0: none
@@ -149,7 +150,7 @@ struct LcmLink::Data {
     void fill_state(const SignalTable& signals) noexcept;
     void fill_command(const SignalTable& signals) noexcept;
     void send_rig(std::int64_t now_ns, const SignalTable& signals) noexcept;
-    void send_controller(std::int64_t now_ns, const SignalTable& signals) noexcept;
+    void send_controller(const SignalTable& signals) noexcept;
 };
 
 // ---- construction ---------------------------------------------------------------------------------------
@@ -187,6 +188,7 @@ void LcmLink::Data::start_rig(SignalTable& signals, const std::string& url) {
             subscription<driver_input_t>(channel::driver_request)},
            {"clutch_command", "engine_request", "transmission_status", "driver_request"});
     command_valid_signal = find_or_add(signals, "bus.command_valid");
+    command_age_signal = find_or_add(signals, "bus.command_age", plant::Unit::second);
     describe(names, info);
     const std::size_t length = std::min(options.model_name.size(), sizeof info.model_name - 1);
     std::memcpy(info.model_name, options.model_name.data(), length);
@@ -329,7 +331,9 @@ void LcmLink::Data::apply_command(const clutch_command_t& message, SignalTable& 
                                                                      : message.fraction;
         set(signals, clutch.command, values[i]);
     }
-    answered_seq = std::max(answered_seq, message.answers_seq);
+    if (message.answers_seq < answered_seq) return;
+    answered_seq = message.answers_seq;
+    if (answered_seq >= 0) answered_ns = message.sim_time_ns;
 }
 
 void LcmLink::Data::apply_driver(const driver_input_t& message, SignalTable& signals) const noexcept {
@@ -369,6 +373,7 @@ void LcmLink::Data::update_status(std::int64_t now_ns, SignalTable& signals) noe
     command_valid = channels[at_command].alive(now_ns, options.command_timeout_ns) ||
                     (grace && !channels[at_command].seen);
     set(signals, command_valid_signal, command_valid);
+    set(signals, command_age_signal, answered_ns < 0 ? 0 : 1e-9 * static_cast<double>(now_ns - answered_ns));
 }
 
 // ---- sending
@@ -378,7 +383,7 @@ void LcmLink::send(std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REA
     if (data_->options.role == Role::rig)
         data_->send_rig(now_ns, signals);
     else
-        data_->send_controller(now_ns, signals);
+        data_->send_controller(signals);
 }
 
 // speeds_t comes last: it is the question, and what a controller needs for its answer is then before it.
@@ -404,9 +409,9 @@ void LcmLink::Data::send_rig(std::int64_t now_ns, const SignalTable& signals) no
     }
 }
 
-void LcmLink::Data::send_controller(std::int64_t now_ns, const SignalTable& signals) noexcept {
+void LcmLink::Data::send_controller(const SignalTable& signals) noexcept {
     if (question_seq == command.answers_seq) return;
-    if (status_cycle.due(now_ns)) {
+    if (status_cycle.due(rig_time_ns)) {
         engine.speed_request_enable = get(signals, names.speed_request_enable) != 0;
         engine.speed_request_rad_s = get(signals, names.speed_request);
         engine.torque_limit = names.torque_limit < 0 ? 1 : get(signals, names.torque_limit);

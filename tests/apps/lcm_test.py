@@ -83,6 +83,14 @@ class OnLcm(unittest.TestCase):
             self.run_rig(self.path(name), "--pace", "lockstep", "--answer-timeout", "60")
         return self.path(name)
 
+    def columns(self, recording):
+        """The recording as {column: [value, ...]}."""
+        path = recording + ".csv"
+        subprocess.run([RIG, "export", recording, "--csv", path], check=True, stderr=subprocess.DEVNULL)
+        with open(path, newline="", encoding="utf-8") as file:
+            head, *rows = csv.reader(file)
+        return {name: [float(row[i]) for row in rows] for i, name in enumerate(head)}
+
     def explained(self, recording):
         return subprocess.run([RIG, "explain", recording], stdout=subprocess.PIPE, text=True, check=True).stdout
 
@@ -100,6 +108,36 @@ class OnLcm(unittest.TestCase):
         self.assertEqual(len(a), len(b))
         self.assertIn("F3 locks", self.explained(first))
         self.replays(first)
+
+    def test_wall_pace_gives_the_gears_of_lockstep_apart_by_the_recorded_latency(self):
+        def gears(columns):
+            """The gears the controller says it is in, and (when, F2 holds, F3 holds) of each change of them."""
+            said, f2, f3 = (columns[name] for name in ("controller.current_gear", "clutch.F2.state", "clutch.F3.state"))
+            changes = [(columns["time_s"][i], f2[i] == 0, f3[i] == 0) for i in range(1900, len(said))
+                       if (f2[i] == 0) != (f2[i - 1] == 0) or (f3[i] == 0) != (f3[i - 1] == 0)]
+            return [said[i] for i in range(1900, len(said)) if said[i] != said[i - 1]], changes
+
+        lockstep = self.columns(self.lockstep_run("lockstep.lcmlog", TCU, "--bus", BUS, "--lockstep"))
+        self.assertEqual(max(lockstep["bus.command_age_s"]), 0)
+        # A controller that hears nothing for two of its cycles (20 ms) goes on by its own clock: a run in which the machine
+        # kept it waiting so long is done again.
+        for attempt in range(6):
+            recording = self.path("wall_%d.lcmlog" % attempt)
+            with Beside(TCU, "--bus", BUS):
+                self.run_rig(recording, "--pace", "wall", "--duration", "2.8")
+            wall = self.columns(recording)
+            latency = max(wall["bus.command_age_s"][1000:])  # the lever moves at 2 s
+            if latency < 0.02:
+                break
+        control_cycle_s = 0.01
+        (said, one), (said_too, other) = gears(lockstep), gears(wall)
+        self.assertEqual(said, [3])
+        self.assertEqual(said_too, [3])
+        self.assertEqual([held for _, *held in one], [[False, False], [False, True]])
+        self.assertEqual([held for _, *held in other], [[False, False], [False, True]])
+        for (expected, *_), (found, *_) in zip(one, other):
+            # What comes late for one of the controller's cycles is seen in the next.
+            self.assertLessEqual(abs(found - expected), latency + control_cycle_s + 1e-9)
 
     def test_logger_beside_the_rig_captures_what_its_recording_holds(self):
         wire, recording = self.path("wire.log"), self.path("run.lcmlog")
