@@ -225,8 +225,8 @@ void Network::run(std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME {
             send_claim(node, node.address, now_ns, port);
         }
         if (node.claim == Claim::waiting && now_ns >= node.claimed_at_ns) node.claim = Claim::claimed;
-        if (node.claim == Claim::lost && node.cannot_claim_ns >= 0 && now_ns >= node.cannot_claim_ns) {
-            node.cannot_claim_ns = -1;
+        if (node.claim == Claim::lost && node.cannot_claim_ns != kSaid && now_ns >= node.cannot_claim_ns) {
+            node.cannot_claim_ns = kSaid;
             send_claim(node, kNoAddress, now_ns, port);
         }
     }

@@ -35,13 +35,14 @@ enum class Claim : std::uint8_t { unclaimed, waiting, claimed, lost };
 
 class Network {
   public:
+    static constexpr std::int64_t kSaid = INT64_MIN;
     struct Node {
         std::string name;
         std::uint8_t address = 0;
         std::uint64_t bits = 0;  // NAME
         Claim claim = Claim::unclaimed;
         std::int64_t claimed_at_ns = 0;     // when waiting ends
-        std::int64_t cannot_claim_ns = -1;  // when to say so, −1: said
+        std::int64_t cannot_claim_ns = kSaid;  // when to say so
         bool announce = false;              // send the claim at the next opportunity
     };
 

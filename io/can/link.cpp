@@ -171,7 +171,6 @@ void CanLink::Data::take(const Frame& frame, std::int64_t now_ns, SignalTable& s
 }
 
 void CanLink::Data::supervise(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME {
-    valid = true;
     for (ReceivedMessage& message : received) {
         const bool supervised = message.timeout_ns > 0;
         const std::int64_t since = message.seen_good ? message.good_ns : receive_start_ns;
@@ -197,9 +196,45 @@ void CanLink::Data::supervise(std::int64_t now_ns, SignalTable& signals) SHIFTRI
         message.was_overdue = overdue;
         message.report.status = status;
         signals.value[static_cast<std::size_t>(message.status_index)] = static_cast<double>(status);
-        if (message.command && overdue) valid = false;
     }
+    valid = judge_commands(now_ns, signals);
     signals.value[static_cast<std::size_t>(valid_index)] = valid ? 1 : 0;
+}
+
+// A controller may send every command message of the mapping or only some of them; one frame made by hand is a controller
+// too. Those heard since all were silent are expected from then on, and valid means that none of them is overdue.
+// After silence the first cycle and a half tells which they are, unless all have come before: until then the
+// old values of a message that is about to arrive must not act. Those of one that does not arrive are forgotten.
+bool CanLink::Data::judge_commands(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME {
+    bool any = false, some_heard = false, all_heard = true, overdue = false, in_grace = false;
+    std::int64_t gathering_ns = 0;
+    for (ReceivedMessage& message : received) {
+        if (!message.command) continue;
+        any = true;
+        const bool heard = (message.seen_good || message.seen_bad) && now_ns - message.heard_ns <= message.timeout_ns;
+        message.expected = message.expected || heard;
+        some_heard = some_heard || heard;
+        all_heard = all_heard && message.expected;
+        overdue = overdue || (message.expected && message.was_overdue);
+        in_grace = in_grace || now_ns - receive_start_ns <= message.timeout_ns;
+        gathering_ns = std::max(gathering_ns, message.late_ns);
+    }
+    if (!any) return true;
+    if (!some_heard) {
+        for (ReceivedMessage& message : received) message.expected = false;
+        hearing_commands = commands_gathered = false;
+        return in_grace;
+    }
+    if (!hearing_commands) commands_began_ns = now_ns;
+    hearing_commands = true;
+    if (!commands_gathered && (all_heard || now_ns - commands_began_ns >= gathering_ns)) {
+        commands_gathered = true;
+        for (const ReceivedMessage& message : received)
+            if (message.command && !message.expected && message.seen_good)
+                for (const Field& field : message.fields)
+                    signals.value[static_cast<std::size_t>(field.index)] = field.absent;
+    }
+    return (commands_gathered || in_grace) && !overdue;
 }
 
 // What came in several frames, and what somebody asks us to send.
@@ -397,6 +432,8 @@ void CanLink::set_fault(std::uint32_t spn, std::uint8_t fmi, bool active,
 
 void CanLink::claim_addresses() {
     if (!data_->network) return;
+    // All of it lies before time 0: a log that is replayed and faults of the bus begin with the first tick.
+    constexpr std::int64_t kBefore = -60'000'000'000;
     const auto start = std::chrono::steady_clock::now();
     const auto all_settled = [this] {
         const auto& nodes = data_->network->nodes();
@@ -404,10 +441,11 @@ void CanLink::claim_addresses() {
             return node.claim == j1939::Claim::claimed || node.claim == j1939::Claim::lost;
         });
     };
-    for (std::int64_t now_ns = 0; !all_settled() || now_ns == 0;) {
+    for (std::int64_t now_ns = kBefore; !all_settled() || now_ns == kBefore;) {
         data_->network->run(now_ns, *data_->port);
         data_->port->wait(10'000'000);
-        now_ns = std::chrono::nanoseconds(std::chrono::steady_clock::now() - start).count();
+        const auto passed = std::chrono::nanoseconds(std::chrono::steady_clock::now() - start).count();
+        now_ns = std::min<std::int64_t>(kBefore + passed, -1);
         const std::size_t count = data_->port->receive(now_ns, data_->buffer);
         for (std::size_t i = 0; i < count; ++i) data_->network->take(data_->buffer[i], now_ns, *data_->port);
     }

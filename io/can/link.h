@@ -77,8 +77,9 @@ class CanLink {
     // Sends what is due by now. Once a tick, after the step.
     void send(std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REALTIME;
 
-    // 1 ("valid") from the start for one timeout of grace, then as long as every message marked `command` in
-    // the mapping has been trusted within its timeout. Also the signal `bus.command_valid`.
+    // True from the start for one timeout of grace; then while at least one message marked `command` in the mapping
+    // arrives, and each of those heard since the last complete silence has been trusted within its timeout. Also
+    // the signal `bus.command_valid`.
     bool command_valid() const SHIFTRIG_REALTIME;
 
     // Lockstep: the mapping names a question (clutch feedback A) and its answer (clutch command A), which

@@ -103,7 +103,7 @@ CanLink::Data::Data(const Mapping& mapping, CanPort& a_port, SignalTable& signal
     spread_phases();
     judge_load(mapping);
     valid_index = own_signal(signals, "bus.command_valid",
-                             "1 while every command message has been trusted within its timeout", 1);
+                             "1 while the command messages that the controller sends are trusted within their timeouts", 1);
 }
 
 // ---- one signal --------------------------------------------------------------------------------------------

@@ -75,6 +75,7 @@ struct ReceivedMessage {
     bool seen_good = false, seen_bad = false, last_was_bad = false, was_overdue = false;
     bool counting = false;  // last_counter is known
     unsigned last_counter = 0;
+    bool expected = false;  // a command that the controller sends: its silence is a loss
 };
 
 struct SentMessage {
@@ -117,6 +118,7 @@ struct CanLink::Data {
                 SignalTable& signals) const SHIFTRIG_REALTIME;
     void take(const Frame& frame, std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME;
     void supervise(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME;
+    bool judge_commands(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME;
     void encode(SentMessage& message, const SignalTable& signals) SHIFTRIG_REALTIME;
     void transmit(SentMessage& message, std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REALTIME;
     bool due(SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME;
@@ -141,6 +143,8 @@ struct CanLink::Data {
 
     bool started_receiving = false, started_sending = false, valid = true;
     std::int64_t receive_start_ns = 0, last_send_ns = 0;
+    bool hearing_commands = false, commands_gathered = false;  // see judge_commands
+    std::int64_t commands_began_ns = 0;
 
     // Lockstep. For the rig `question` is sent and `answer` received, for the controller the other way round.
     int question = -1, answer = -1;  // indices into `sent` or `received`

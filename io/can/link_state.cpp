@@ -17,7 +17,7 @@ void CanLink::archive(Archive& a) {
     for (ReceivedMessage& m : d.received) {
         archive_report(a, m.report);
         a(m.heard_ns, m.good_ns, m.bad_ns, m.seen_good, m.seen_bad, m.last_was_bad, m.was_overdue, m.counting,
-          m.last_counter);
+          m.last_counter, m.expected);
     }
     for (SentMessage& m : d.sent) {
         archive_report(a, m.report);
@@ -25,6 +25,7 @@ void CanLink::archive(Archive& a) {
         for (Field& field : m.fields) a(field.travelled);
     }
     a(d.started_receiving, d.started_sending, d.valid, d.receive_start_ns, d.last_send_ns);
+    a(d.hearing_commands, d.commands_gathered, d.commands_began_ns);
     if (d.network) d.network->archive(a);
     a(d.awaiting, d.pending, d.asked_before, d.question_counter, d.question_ns, d.command_arrived_ns);
 }

@@ -8,7 +8,9 @@
 
 #include "io/can/candump.h"
 #include "io/can/inprocess.h"
+#include "io/can/link.h"
 #include "io/input_error.h"
+#include "tests/io/can_rig_signals.h"
 
 namespace shiftrig::io::can {
 namespace {
@@ -145,6 +147,35 @@ TEST_F(CandumpFile, ALogInWallTimeBeginsWithItsFirstFrame) {
     EXPECT_EQ(replay.receive(0, frames), 1U);
     EXPECT_EQ(replay.receive(9'999'999, frames), 0U);
     EXPECT_EQ(replay.receive(10'000'000, frames), 1U);
+}
+
+TEST_F(CandumpFile, ClaimingAddressesTakesNothingFromTheReplayAndIsLoggedAsOfTimeZero) {
+    std::ofstream(path_) << "(0.000000) vcan0 18FF1003#0000E02E00000760\n(0.200000) vcan0 18FF1003#0000E02E00000711\n";
+    const Mapping mapping = tractor_mapping();
+    InProcessBus bus(2);
+    CandumpReplay replay(path_, message_filters(mapping, Role::rig), &bus.end(0));
+    const std::string log = path_ + ".written";
+    {
+        CandumpLogger logged(replay, log);
+        SignalTable table = rig_signals();
+        CanLink link(mapping, logged, table, {.address_claim = AddressClaim::claim});
+        link.claim_addresses();  // 0x80 waits 250 ms
+        EXPECT_FALSE(replay.finished());
+        for (int ms = 0; ms <= 200; ++ms) link.receive(ms * 1'000'000LL, table);
+        EXPECT_EQ(value(table, "bus.TransmissionSensors.address"), 1);
+        for (const auto& message : link.report()) {
+            if (message.name == "ClutchCommandA") {
+                EXPECT_EQ(message.good, 2U);
+            }
+        }
+    }
+    const auto written = read_candump(log);
+    std::filesystem::remove(log);
+    ASSERT_EQ(written.size(), 5U + 2U);
+    for (std::size_t i = 0; i < 5; ++i) {
+        EXPECT_EQ(written[i].frame.id & 0x03FFFF00U, 0x00EEFF00U);
+        EXPECT_EQ(written[i].frame.timestamp_ns, 0);
+    }
 }
 
 TEST_F(CandumpFile, AMissingOrUnwritableFileIsSaidInOneLine) {

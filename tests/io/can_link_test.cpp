@@ -288,6 +288,56 @@ TEST(Trust, ARigThatNeverHearsACommandSaysSoAfterOneTimeout) {
     EXPECT_EQ(sides.rig_value("bus.ClutchCommandA.status"), 0);
 }
 
+TEST(Trust, OneCommandFrameMadeByHandIsFollowedUntilItsTimeout) {
+    RigAndStranger rig;
+    rig.run(0, 500, false);
+    ASSERT_FALSE(rig.rig_link.command_valid());
+    rig.hear(command_a(0, 500), 500 * kMs);
+    std::vector<int> valid_ms;
+    for (int ms = 501; ms < 900; ++ms) {
+        if (ms == 550) rig.bus.end(2).send(ms * kMs, command_a(0, 700));  // the same counter: not believed
+        rig.tick(ms * kMs, false);
+        if (rig.rig_link.command_valid()) valid_ms.push_back(ms);
+    }
+    // From a cycle and a half, in which messages B and C might still have come, to the timeout.
+    ASSERT_EQ(valid_ms.size(), 86U);
+    EXPECT_EQ(valid_ms.front(), 515);
+    EXPECT_EQ(valid_ms.back(), 600);
+    EXPECT_DOUBLE_EQ(rig.f1(), 5e5);
+}
+
+TEST(Trust, CommandsFromBeforeASilenceDoNotActWhenOnlyAnotherMessageReturns) {
+    RigAndStranger rig;
+    value(rig.tcu, "clutch.F1.pressure_command") = 8e5;
+    value(rig.tcu, "clutch.F4.pressure_command") = 9e5;
+    rig.run(0, 500);
+    rig.run(500, 700, false);
+    ASSERT_FALSE(rig.rig_link.command_valid());
+    rig.hear(command_a(0, 500), 700 * kMs);
+    for (int ms = 701; ms < 790; ++ms) {
+        rig.tick(ms * kMs, false);
+        if (rig.rig_link.command_valid()) {
+            EXPECT_EQ(rig.rig_value("clutch.F4.pressure_command"), 0) << ms;
+        }
+    }
+    EXPECT_TRUE(rig.rig_link.command_valid());
+    EXPECT_DOUBLE_EQ(rig.f1(), 5e5);
+}
+
+TEST(Trust, ASingleCommandMessageThatFallsSilentIsALoss) {
+    RigAndStranger rig;
+    rig.run(0, 500);
+    ASSERT_TRUE(rig.rig_link.command_valid());
+    // From now on command A alone.
+    for (int ms = 500; ms < 700; ++ms) {
+        if (ms % 10 == 0)
+            rig.bus.end(2).send(ms * kMs, command_a(static_cast<unsigned>(ms / 10) & 15U, 500));
+        rig.tick(ms * kMs, false);
+    }
+    EXPECT_EQ(rig.rig_value("bus.ClutchCommandA.status"), 1);
+    EXPECT_FALSE(rig.rig_link.command_valid()) << "B and C belong to what this controller sends";
+}
+
 // ---- lockstep --------------------------------------------------------------------------------------------------
 
 TEST(Lockstep, TheAnswerEchoesTheQuestionAndArrivesAfterEverythingElseOfItsCycle) {
