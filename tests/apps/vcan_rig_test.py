@@ -7,6 +7,8 @@ import json
 import os
 import signal
 import socket
+import statistics
+import struct
 import subprocess
 import sys
 import tempfile
@@ -19,12 +21,7 @@ CYCLES = {  # [ms], spec of the messages
     "0CF00400": 20, "0CF00300": 50, "0CF00203": 10, "18F00503": 100, "0C010305": 50, "0C000003": 10, "18FEF100": 100,
     "18F0010B": 100, "18FEF880": 1000, "0CFE48F0": 100, "0CFE49F0": 100, "18FF1003": 10, "18FF1103": 10, "18FF1203": 10,
     "18FF2080": 10, "18FF2180": 10, "18FF2280": 10, "18FF3080": 10, "18FF3180": 10}
-
-
-# Three tests time the rig against the wall to 20 ms and fail inside user-mode Linux, where the rig's simulated time and a
-# sleep beside it do not run alike; the link going down and coming up is held there by can_socketcan_test. Set
-# SHIFTRIG_TIMELY_CAN on a machine whose own kernel has vcan.
-UNTIMELY = "needs a kernel with vcan that keeps time: set SHIFTRIG_TIMELY_CAN to run it"
+BY_HAND = "18FF1003#0000E02E00000760"  # clutch F2: 12 bar; the line of docs/can.md
 
 
 def rig(*arguments):
@@ -40,8 +37,11 @@ def result_of(process):
 
 
 class Controller:
+    def __init__(self, *arguments):
+        self.arguments = arguments
+
     def __enter__(self):
-        self.process = subprocess.Popen([TCU, "--bus", "can:vcan0"], stderr=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen([TCU, "--bus", "can:vcan0", *self.arguments], stderr=subprocess.PIPE, text=True)
         self.process.stderr.readline()
         return self
 
@@ -55,7 +55,7 @@ class Candump:
 
     def __enter__(self):
         self.file = tempfile.NamedTemporaryFile("w+", suffix=".log")
-        self.process = subprocess.Popen(["candump", "-L", "vcan0"], stdout=self.file)
+        self.process = subprocess.Popen(["candump", "-L", "-r", "8000000", "vcan0"], stdout=self.file)
         time.sleep(0.3)
         return self
 
@@ -71,6 +71,29 @@ class Candump:
                 yield float(stamp[1:-1]), identifier, data
 
 
+def wait_for(identifier, condition=lambda data: True, patience=120):
+    """Until a frame with this identifier, and data that fulfil the condition, is on the bus."""
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as watch:
+        extended = int(identifier, 16) | socket.CAN_EFF_FLAG
+        watch.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, struct.pack("=II", extended, extended))
+        watch.bind(("vcan0",))
+        watch.settimeout(patience)
+        while not condition(watch.recv(16)[8:]):
+            pass
+
+
+def typical_slope(times):
+    """The median slope of time over number, between any two of the times [Theil, Sen]: one late in four does not move it."""
+    points = list(enumerate(times))[::max(1, len(times) // 300)]
+    return statistics.median((t2 - t1) / (n2 - n1) for i, (n1, t1) in enumerate(points) for n2, t2 in points[i + 1:])
+
+
+def first_command(table):
+    """When F3 was first commanded [s]."""
+    with open(table) as file:
+        return next(float(row["time_s"]) for row in csv.DictReader(file) if float(row["clutch.F3.pressure_command_pa"]) > 0)
+
+
 def changes(result):
     """When the friction pairs changed their state: {(kind, device): time of the first}."""
     first = {}
@@ -82,58 +105,93 @@ def changes(result):
 
 class VcanRig(unittest.TestCase):
     def test_candump_shows_every_message_at_its_cycle_time(self):
-        # A machine that is busy with other things runs both programs late. The rig says by how much on the whole, the
-        # controller does not: several chances.
-        for attempt in range(5):
-            with Candump() as dump, Controller():
-                result = result_of(rig("--scenario", SHIFT))
-            times = {}
-            for stamp, identifier, _ in dump.frames():
-                times.setdefault(identifier, []).append(stamp)
-            self.assertEqual(sorted(set(CYCLES) - set(times)), [])
-            late = max(1, result["loop"]["wall_time_s"] / 6)
-            wrong = {}
-            for identifier, cycle in CYCLES.items():
-                seen = times[identifier]
-                mean = 1000 * (seen[-1] - seen[0]) / (len(seen) - 1)
-                from_controller = identifier.endswith("03")
-                if abs(mean / (1 if from_controller else late) - cycle) > 0.02 * cycle:
-                    wrong[identifier] = mean
-            if not wrong:
-                return
-        self.fail("mean cycle times [ms]: %s" % wrong)
+        # In lockstep the order on the bus tells simulated time, whatever the clock of this kernel does: feedback A ends
+        # each 10 ms.
+        with Candump() as dump, Controller("--lockstep"):
+            result_of(rig("--scenario", SHIFT, "--pace", "lockstep"))
+        now, times = 0, {}
+        for _, identifier, _ in dump.frames():
+            times.setdefault(identifier, []).append(now)
+            now += 10 if identifier == "18FF2080" else 0
+        self.assertEqual(now, 6000)
+        self.assertEqual(sorted(set(CYCLES) - set(times)), [])
+        for identifier, cycle in CYCLES.items():
+            seen = times[identifier]
+            self.assertGreaterEqual(len(seen), 6000 // cycle - 1, identifier)
+            self.assertAlmostEqual((seen[-1] - seen[0]) / (len(seen) - 1), cycle, delta=0.02 * cycle, msg=identifier)
 
-    @unittest.skipUnless("SHIFTRIG_TIMELY_CAN" in os.environ, UNTIMELY)
+    def test_candump_shows_the_cycle_times_on_the_clock(self):
+        # The rig in slow motion, the controller by its own clock: on one processor of user-mode Linux 1 kHz in real time
+        # leaves too little to the others.
+        slow = 4
+        with Candump() as dump, Controller():
+            result_of(rig("--scenario", SHIFT, "--duration", "4", "--factor", str(1 / slow)))
+        times = {}
+        for stamp, identifier, _ in dump.frames():
+            times.setdefault(identifier, []).append(1000 * stamp)
+        begin, end = times["18FF2080"][0], times["18FF2080"][-1]
+        wrong = {}
+        for identifier, cycle in CYCLES.items():
+            if identifier == "18FF1003":
+                continue  # follows feedback A, not the clock: see the test above
+            seen = [t for t in times[identifier] if begin <= t <= end]
+            if identifier.endswith("03"):  # the controller leaves out the cycles it sleeps through
+                wanted, found = cycle, statistics.median(after - before for before, after in zip(seen, seen[1:]))
+            else:  # the rig makes up for them
+                wanted, found = slow * cycle, typical_slope(seen)
+            if abs(found - wanted) > 0.02 * wanted:
+                wrong[identifier] = found
+        self.assertEqual(wrong, {}, "cycle times [ms]")
+
     def test_a_command_made_by_hand_moves_the_clutch(self):
         with tempfile.NamedTemporaryFile("r", suffix=".csv") as table:
-            with Candump() as dump:
-                process = rig(SOURCE + "/config/tractor.yaml", "--duration", "6", "--csv", table.name)
-                while not any(i == "18FF2080" for _, i, _ in dump.frames()):  # the rig has begun
-                    time.sleep(0.05)
-                for _ in range(10):
-                    subprocess.run(["cansend", "vcan0", "18FF1003#0000E02E00000760"], check=True)
-                    time.sleep(0.02)
-                result = result_of(process)
-            pressures = [float(row["clutch.F2.pressure_pa"]) for row in csv.DictReader(table)]
-        self.assertEqual(pressures[0], 0)
-        self.assertGreater(max(pressures), 0.8e5, "the piston has left its stop")
+            process = rig(SOURCE + "/config/tractor.yaml", "--duration", "3", "--csv", table.name)
+            wait_for("18FF2080")  # the rig has begun
+            time.sleep(0.5)       # and nobody has commanded it for longer than the timeout
+            subprocess.run(["cansend", "vcan0", BY_HAND], check=True)
+            result = result_of(process)
+            rows = list(csv.DictReader(table))
+        heard = [i for i, row in enumerate(rows) if row["bus.ClutchCommandA.status"] == "1"]
+        valid = [i for i, row in enumerate(rows) if i > 200 and row["bus.command_valid"] == "1"]
+        pressures = [float(row["clutch.F2.pressure_pa"]) for row in rows]
+        # Ticks, not seconds: the frame acts from a cycle and a half after it came, until its timeout of 100 ms.
+        self.assertEqual((valid[0] - heard[0], valid[-1] - heard[0]), (15, 100))
+        self.assertEqual(len(valid), 86)
+        self.assertEqual(max(pressures[:heard[0]]), 0)
+        self.assertGreater(max(pressures), 5e5, "the clutch is being filled")
         self.assertLess(pressures[-1], 0.1e5, "silence since then is the safe command")
         self.assertEqual(result["final"]["rig.safe_command"], 1)
-        self.assertEqual(max(float(p) for p in [result["final"]["clutch.F1.pressure_pa"]]), 0)
+        self.assertEqual(max(float(row["clutch.F1.pressure_pa"]) for row in rows), 0)
 
-    @unittest.skipUnless("SHIFTRIG_TIMELY_CAN" in os.environ, UNTIMELY)
     def test_an_interface_that_goes_down_in_mid_shift_is_survived(self):
-        with Controller():
-            process = rig("--scenario", SHIFT)
-            time.sleep(2.6)
-            subprocess.run(["ip", "link", "set", "vcan0", "down"], check=True)
-            time.sleep(0.5)
-            subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
-            result = result_of(process)
+        # A slow shift, so that its middle is not missed on a machine that is busy with other things.
+        with open(SOURCE + "/config/calibration/tractor.yaml") as file:
+            calibration = file.read()
+        for was, now in (("torque_time_s: 0.08", "torque_time_s: 0.4"), ("inertia_time_s: 0.25", "inertia_time_s: 1.5"),
+                         ("timeout_s: 1.2", "timeout_s: 5"), ("../can", SOURCE + "/config/can")):
+            self.assertIn(was, calibration)
+            calibration = calibration.replace(was, now)
+        with tempfile.NamedTemporaryFile("w", suffix=".yaml") as slow:
+            slow.write(calibration)
+            slow.flush()
+            with Controller("--calibration", slow.name):
+                process = rig("--scenario", SHIFT)
+                wait_for("0C010305", lambda data: data[2] == 125 + 3)     # the lever stands at 3 …
+                wait_for("0CF00203", lambda data: data[0] >> 4 & 3 == 1)  # … and the controller says "shift in process"
+                subprocess.run(["ip", "link", "set", "vcan0", "down"], check=True)
+                time.sleep(1)
+                subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
+                out, err = process.communicate(timeout=300)
+        self.assertEqual(process.returncode, 0, err)
+        result = json.loads(out.splitlines()[-1])
         self.assertEqual(result["ticks"], 6000)
-        said = " ".join(event["text"] for event in result["events"])
-        self.assertIn("safe command", said)
+        # A controller that the kernel does not let run for 100 ms is silent, too: more such pairs may come before.
+        times = {kind: [e["time_s"] for e in result["events"] if e["kind"] == kind] for kind in ("safe_command", "commands_return")}
+        silent = [t for t in times["safe_command"] if 2.1 < t < 3.8]  # the lever moves at 2 s, F3 would lock near 4 s
+        self.assertTrue(silent, times)
+        self.assertGreater(times["commands_return"][-1], silent[0] + 0.5)
         self.assertEqual(result["final"]["bus.command_valid"], 1, "commands are heard again")
+        self.assertIn("1 reconnects", err)
 
     def test_a_j1939_socket_of_the_kernel_receives_etc1_and_eec1(self):
         with socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, socket.CAN_J1939) as listener:
@@ -153,39 +211,41 @@ class VcanRig(unittest.TestCase):
         self.assertEqual((source, len(eec1)), (0, 8))
         self.assertAlmostEqual((eec1[3] | eec1[4] << 8) * 0.125, 1801, delta=30)
 
-    @unittest.skipUnless("SHIFTRIG_TIMELY_CAN" in os.environ, UNTIMELY)
     def test_canplayer_and_the_rigs_own_replay_give_the_same_shift(self):
-        # One run with a controller, logged by candump …
-        with Candump() as dump, Controller():
-            first = result_of(rig("--scenario", SHIFT))
-        commands = [(t, i, d) for t, i, d in dump.frames() if i.endswith("03") and i in CYCLES]
-        start = next(t for t, i, _ in dump.frames() if i == "18FF2080")
-        with tempfile.NamedTemporaryFile("w", suffix=".log") as log:
-            # … its commands from the rig's first feedback on, told again by the rig itself and by canplayer.
-            for stamp, identifier, data in commands:
-                if stamp >= start:
-                    log.write("(%.6f) vcan0 %s#%s\n" % (stamp, identifier, data))
-            log.flush()
-            own = result_of(rig("--scenario", SHIFT, "--pace", "wall", "--can-replay", log.name))
-            with Candump() as second:
-                process = rig("--scenario", SHIFT)
-                # It claims its addresses 250 ms before its time 0.
-                while not any(i == "18EEFF80" for _, i, _ in second.frames()):
-                    time.sleep(0.005)
-                time.sleep(0.2)
-                subprocess.run(["canplayer", "-I", log.name], check=True)
-                played = result_of(process)
-            feedback = next(t for t, i, _ in second.frames() if i == "18FF2080")
-            command = next(t for t, i, _ in second.frames() if i in ("18FF1003", "18FF1103", "18FF1203"))
-        # canplayer was started by hand: by so much it is off the rig's time.
-        late = command - feedback
-        for result in (own, played):
-            self.assertEqual([(s["from"], s["to"], s["completed"]) for s in result["shifts"]], [("F2", "F3", True)])
-        theirs, ours = changes(played), changes(own)
+        # The log is made in lockstep, its times are simulated ones. canplayer tells it in slow motion to a rig in slow
+        # motion: what the kernel is late (a plain cangen of 10 ms is up to 30 ms late in user-mode Linux on a busy
+        # machine) is then a fifth of that in the rig's time, and the bar of 20 ms is one.
+        slow = 5
+        with tempfile.TemporaryDirectory() as folder:
+            whole, commands, stretched = (os.path.join(folder, name) for name in ("whole.log", "commands.log", "slow.log"))
+            with Controller("--lockstep"):
+                first = result_of(rig("--scenario", SHIFT, "--pace", "lockstep", "--can-log", whole))
+            with open(whole) as log, open(commands, "w") as own, open(stretched, "w") as theirs:
+                for line in log:
+                    stamp, interface, frame = line.split()[:3]
+                    if frame.split("#")[0] in CYCLES and frame.split("#")[0].endswith("03"):
+                        own.write(line)
+                        theirs.write("(%.6f) %s %s\n" % (slow * float(stamp[1:-1]), interface, frame))
+            own = os.path.join(folder, "own.csv")
+            ours = result_of(rig("--scenario", SHIFT, "--pace", "free", "--can-replay", commands, "--csv", own))
+            # The player first: the rig begins in the two seconds of the log before the shift.
+            player = subprocess.Popen(["canplayer", "-I", stretched])
+            played = os.path.join(folder, "played.csv")
+            theirs = result_of(rig("--scenario", SHIFT, "--duration", "4", "--factor", str(1 / slow), "--csv", played))
+            player.terminate()
+            player.wait()
+            began = {name: first_command(name) for name in (own, played)}
+        for name, result in (("first", first), ("own", ours), ("played", theirs)):
+            self.assertEqual([(s["from"], s["to"], s["completed"]) for s in result["shifts"]], [("F2", "F3", True)], name)
+        self.assertNotIn("safe_command", [event["kind"] for event in ours["events"] + theirs["events"]])
+        # Two clocks that were started by hand have no common zero: times count from the first command to F3.
+        theirs, ours = changes(theirs), changes(ours)
         self.assertEqual(sorted(theirs), sorted(ours))
-        for change, moment in ours.items():
-            self.assertAlmostEqual(theirs[change] - late, moment, delta=0.020 + 0.010, msg=change)
-        self.assertEqual([(s["from"], s["to"]) for s in first["shifts"]], [("F2", "F3")])
+        self.assertGreaterEqual(len(ours), 3)
+        off = {change: (theirs[change] - began[played]) - (ours[change] - began[own]) for change in ours}
+        print("canplayer against the rig's own replay [ms]:", {" ".join(c): round(1000 * d, 1) for c, d in off.items()}, file=sys.stderr)
+        for change, difference in off.items():
+            self.assertLess(abs(difference), 0.020, change)
 
 
 if __name__ == "__main__":
