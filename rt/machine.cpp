@@ -157,7 +157,7 @@ Finding isolated_processors(const fs::path& root) {
             ""};
     }
     return {"isolated processors", Verdict::warning, "none",
-            "boot with isolcpus=N nohz_full=N rcu_nocbs=N and run the plant thread on N (--processor N)"};
+            "boot with isolcpus=N nohz_full=N rcu_nocbs=N and run the plant thread on N (--cpu N)"};
 }
 
 Finding interrupts(const fs::path& root) {

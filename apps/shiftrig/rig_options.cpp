@@ -24,6 +24,10 @@ void RigOptions::add_common_to(CLI::App& app, const std::string& usual_pace) {
     app.add_option("--kernel", choices.kernel, "auto | portable | avx2 | avx512")->capture_default_str();
     app.add_option("--catch-up", catch_up, "wall pace: ticks it may be behind before it skips or aborts")->check(CLI::NonNegativeNumber)->capture_default_str();
     app.add_option("--overrun", overrun, "what happens then")->check(CLI::IsMember({"skip", "abort"}))->capture_default_str();
+    app.add_option("--late-limit", late_limit, "wall pace: late ticks in a row that are too many; 0: any number will do")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    app.add_option("--when-late", when_late, "what happens then")->check(CLI::IsMember({"record", "skip", "abort"}))->capture_default_str();
     app.add_option("--answer-timeout", answer_timeout_s, "lockstep: seconds to wait for an answer")->check(CLI::PositiveNumber)->capture_default_str();
     app.add_option("--priority", priority, "wall pace: FIFO priority of the plant thread; 0: none")->check(CLI::Range(0, 99))->capture_default_str();
     app.add_option("--cpu", processors, "processors the plant thread may run on");
@@ -40,6 +44,8 @@ rt::LoopSettings RigOptions::loop(const rig::Setup& setup) const {
     settings.factor = factor;
     settings.catch_up = catch_up;
     settings.beyond_bound = overrun == "abort" ? rt::BeyondBound::abort : rt::BeyondBound::skip;
+    settings.late_run_limit = late_limit;
+    settings.late_run = when_late == "abort" ? rt::LateRun::abort : when_late == "skip" ? rt::LateRun::skip : rt::LateRun::record;
     settings.answer_timeout = std::llround(answer_timeout_s * 1e9);
     const double duration = duration_s.value_or(setup.scenario ? setup.scenario->duration : 0);
     if (duration > 0) settings.slots = std::llround(duration * 1e9 / static_cast<double>(setup.tick_ns));

@@ -18,6 +18,8 @@ struct RigOptions {
     std::optional<double> duration_s;   // else the scenario's, else without end
     std::int64_t catch_up = 100;        // [ticks]
     std::string overrun = "skip";       // skip, abort
+    std::int64_t late_limit = 0;        // [ticks in a row]; 0: none
+    std::string when_late = "record";   // record, skip, abort
     double answer_timeout_s = 1;        // lockstep
     int priority = 80;                  // FIFO; 0: none
     std::vector<int> processors;

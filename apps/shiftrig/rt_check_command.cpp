@@ -117,7 +117,7 @@ Command::Run declare(CLI::App& app) {
     app.add_option("--priority", options->priority, "FIFO priority, 0: none")
         ->check(CLI::Range(0, 99))
         ->capture_default_str();
-    app.add_option("--processor", options->processors, "processors the loop may run on");
+    app.add_option("--cpu,--processor", options->processors, "processors the loop may run on");
     app.add_flag("!--no-measurement", options->measure, "only examine");
     app.add_flag("--json", options->json, "for programs");
     return [options] { return run(*options); };

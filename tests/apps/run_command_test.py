@@ -140,7 +140,19 @@ class Results(InAFolder):
         replayed = subprocess.run([SHIFTRIG, "replay", recording], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.assertEqual(replayed.returncode, 0, replayed.stderr + replayed.stdout)
         with open(trace) as file:
-            self.assertTrue(json.load(file))
+            self.assert_chrome_trace(json.load(file), ticks=6000)
+
+    # The Trace Event Format as chrome://tracing and ui.perfetto.dev read it.
+    def assert_chrome_trace(self, trace, ticks):
+        events = trace["traceEvents"]
+        rows = {e["tid"]: e["args"]["name"] for e in events if e["ph"] == "M" and e["name"] == "thread_name"}
+        spans = [e for e in events if e["ph"] == "X"]
+        self.assertEqual(len(rows) + len(spans), len(events))
+        for span in spans:
+            self.assertIn(span["tid"], rows)
+            self.assertGreaterEqual(span["ts"], 0)
+            self.assertGreaterEqual(span["dur"], 0)
+        self.assertEqual([e["args"]["slot"] for e in spans if e["name"] == "tick"], list(range(ticks)))
 
     def test_candump_log_takes_the_controllers_place(self):
         log = self.path("shift.log")
@@ -177,6 +189,53 @@ class Results(InAFolder):
         done = run("--scenario", SHIFT, "--pace", "free")
         self.assertEqual(done.returncode, 0)
         self.assertNotIn("\r", done.stderr + done.stdout)
+
+
+def at_wall_pace(*arguments, prefix=()):
+    done = run("--scenario", SHIFT, "--pace", "wall", "--json", *arguments, prefix=prefix)
+    return done, json.loads(done.stdout.splitlines()[-1])
+
+
+class RealTime(InAFolder):
+    # Two thousand times as fast as the clock: every tick is late.
+    def test_too_many_late_ticks_in_a_row_end_the_run_where_that_is_asked_for(self):
+        done, result = at_wall_pace("--factor", "2000", "--catch-up", "1000000", "--late-limit", "50", "--when-late", "abort")
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual(result["loop"]["outcome"], "late_too_often")
+        self.assertEqual(result["loop"]["late_runs"], 1)
+        self.assertGreaterEqual(result["loop"]["longest_late_run"], 50)
+        self.assertLess(result["ticks"], 6000)
+
+    def test_late_ticks_are_only_counted_where_nothing_else_is_asked_for(self):
+        done, result = at_wall_pace("--factor", "2000", "--catch-up", "1000000", "--late-limit", "50")
+        self.assertEqual(done.returncode, 0)
+        self.assertEqual(result["ticks"], 6000)
+        self.assertGreater(result["loop"]["late_runs"], 10)
+
+    def test_too_far_behind_ends_the_run_or_skips_as_asked_for(self):
+        done, result = at_wall_pace("--factor", "2000", "--catch-up", "10", "--overrun", "abort")
+        self.assertEqual((done.returncode, result["loop"]["outcome"]), (1, "too_far_behind"))
+        done, result = at_wall_pace("--factor", "2000", "--catch-up", "10")
+        self.assertEqual((done.returncode, result["loop"]["outcome"]), (0, "completed"))
+        self.assertGreater(result["loop"]["skipped"], 0)
+        self.assertEqual(result["loop"]["executed"] + result["loop"]["skipped"], 6000)
+
+    def test_without_privileges_it_runs_and_says_once_what_it_lacks_and_what_would_grant_it(self):
+        prefix = ["prlimit", "--memlock=65536:65536", "--rtprio=0:0"]
+        if os.geteuid() == 0:
+            prefix += ["setpriv", "--bounding-set=-all", "--inh-caps=-all"]
+        recording = self.path("poor.lcmlog")
+        done, result = at_wall_pace("--factor", "4", "--record", recording, prefix=prefix)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(result["loop"]["executed"] + result["loop"]["skipped"], 6000)
+        with open(recording, "rb") as file:
+            kept = file.read().decode(errors="replace")
+        for lacking in ("locked memory", "FIFO priority 80 for the plant thread"):
+            lines = [line for line in done.stderr.splitlines() if lacking in line]
+            self.assertEqual(len(lines), 1, done.stderr)
+            self.assertIn("; to grant it: sudo setcap cap_sys_nice,cap_ipc_lock+ep ", lines[0])
+            self.assertEqual([r["remedy"].startswith("sudo setcap") for r in result["not_granted"] if lacking in r["what"]], [True])
+            self.assertIn(lacking, kept)
 
 
 if __name__ == "__main__":
