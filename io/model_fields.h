@@ -441,6 +441,8 @@ void fields(Fields& f, ModelText& model) {
                                     {"ark3", plant::Method::ark3}},
              "integration; [automatic] goes by the model's size");
     f.optional_integer("maximum_events", d.maximum_events, at_least_one, "localised per step [4]");
+    f.optional_integer("maximum_parts", d.maximum_parts, at_least_one,
+                       "of a step where shafts swing or forces change too fast for one [16]; 1: never");
 }
 
 }  // namespace shiftrig::io

@@ -291,6 +291,9 @@ struct Description {
     Transition transition = Transition::localised;
     Method method = Method::automatic;
     int maximum_events = 4;               // K of numerics.md §4
+    // A step is taken in up to this many parts where shafts swing or forces change too fast for one; 1: never.
+    // Bounds the cost of a step.
+    int maximum_parts = 16;
 };
 
 }  // namespace shiftrig::plant

@@ -1,6 +1,7 @@
 #include "plant/ledger.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "plant/ark3.h"
 #include "plant/transitions.h"
@@ -65,6 +66,11 @@ void forces_at(const ScratchData& scratch, int count, double s, double* f) {
     for (int k = 0; k < count; ++k) f[k] = w0 * scratch.begin.f[k] + w1 * scratch.half.f[k] + w2 * scratch.late.f[k];
 }
 
+// An even number, at least the two of Simpson's rule.
+int ledger_parts(const Mode& mode, double fraction) {
+    return std::max(2, 2 * static_cast<int>(std::ceil(0.5 * mode.ledger_parts * fraction - 1e-9)));
+}
+
 // Stiff shafts swing or die out within a step, where three points see nothing of them. The step's own solution is
 // followed through many parts (exact, as the step is) and the powers are summed over these.
 void book_finely(Work& w, const Mode& mode) {
@@ -74,7 +80,7 @@ void book_finely(Work& w, const Mode& mode) {
     StepOperators op = mode.ledger;
     int parts = mode.ledger_parts;
     if (s.used.length != mode.step.length) {
-        parts = std::max(2, 2 * static_cast<int>(0.5 * parts * h / w.h + 1));
+        parts = ledger_parts(mode, h / w.h);
         op = place_operators(m, s.ledger_memory.data());
         build_step_operators(m, mode, h / parts, op, s.workspace.data());
     }
@@ -133,7 +139,7 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     Sample &begin = w.scratch.begin, &middle = w.scratch.middle, &end = w.scratch.end;
     const double h = end.at.time - begin.at.time;
-    if (!mode.tree && mode.ledger_parts > 1) return book_finely(w, mode);
+    if (!mode.tree && mode.ledger_parts > 1 && ledger_parts(mode, h / w.h) > 2) return book_finely(w, mode);
     w.scratch.dissipated += mode.tree ? tree_middle(w, mode) : fill_middle(w, mode);
 
     const auto simpson = [h](double a, double b, double c) { return h / 6 * (a + 4 * b + c); };

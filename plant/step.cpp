@@ -7,6 +7,7 @@
 #include "plant/finish.h"
 #include "plant/forces.h"
 #include "plant/ledger.h"
+#include "plant/refinement.h"
 #include "plant/transitions.h"
 
 namespace shiftrig::plant {
@@ -29,6 +30,11 @@ double next_split(const Work& w, double from) SHIFTRIG_REALTIME {
         consider((*time - w.start) / w.h);
     for (int k = 0; k < w.model.pairs; ++k) consider(load_edge(w, k, from, split));
     return split;
+}
+
+// On a grid of parts of the step, so that parts that events do not cut are all of the same length.
+double part_end(double from, double split, double length) {
+    return std::min(split, (std::floor(from / length + 1e-6) + 1) * length);
 }
 
 // The engine for long chains, or the one for everything else.
@@ -82,10 +88,18 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     // losses ([Algin] eq. (11), (14), (15), (16)–(25)); what cannot hold at t0+ opens (eq. (12)).
     Mode* mode = &settle(w, s.begin, is_begun(w));
 
+    double length = 1;  // of a part, at most
+    const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.description.maximum_parts : 1);
     for (double done = 0; done < 1;) {
-        // Advance over what is left, up to the next jump of a law.
-        const double until = next_split(w, done);
+        // Advance over what is left, up to the next jump of a law; in halves where that is too much at once.
+        const double split = next_split(w, done);
+        double until = part_end(done, split, length);
         integrate(w, *mode, until);
+        while (length > longest_whole && is_coarse(w, *mode)) {
+            length *= 0.5;
+            until = part_end(done, split, length);
+            integrate(w, *mode, until);
+        }
 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
         Crossing first = first_crossing(w, *mode, s.begin, s.end);

@@ -11,6 +11,8 @@ namespace shiftrig::plant::detail {
 namespace {
 
 constexpr double at_rest = 1e-9;      // a pair that engages at less slip than this closes at once [rad/s]
+// Power that turns round by less is corrected, not located: loss that changes, of the largest torque.
+constexpr double small_loss = 1e-4, small_loss_of_swings = 1e-7;
 constexpr double overload = 1 + 1e-9; // torque over capacity that opens a closed pair
 
 const std::array<Link, 2>& pair_links(const Work& w, int pair) {
@@ -43,6 +45,9 @@ double torque_scale(const Work& w, const Sample& s) {
     return scale;
 }
 
+// What changes in the loss when power turns round, per torque.
+double loss_difference(const Mesh& mesh) { return 1 / mesh.backward_efficiency - mesh.forward_efficiency; }
+
 // Torque at which the two loss lines of a mesh cross: below it the second link drives.
 double loss_kink(const Mesh& mesh, double s) {
     const double slope = mesh.forward_efficiency - 1 / mesh.backward_efficiency;
@@ -50,16 +55,14 @@ double loss_kink(const Mesh& mesh, double s) {
     return s * tau;
 }
 
-// Lossy meshes that stuck ones hold are stuck with them. What clutches hold at rest (a gear before a closed brake)
-// may lean on its loss instead, see lean_on_losses().
+// On the engine for long chains, lossy meshes that others hold at rest carry torque without loss. On the other one they
+// may lean on their loss, see lean_on_losses().
 bool rest_bound_meshes(const Work& w, const Mode& mode, unsigned char* contact) {
+    if (!mode.tree) return false;
     bool changed = false;
-    for (int k = 0; k < w.model.meshes; ++k) {
-        unsigned char& state = contact[w.model.pairs + k];
-        const unsigned char bound = mode.bound[w.model.pairs + k];
-        if (state == stuck || bound == 0 || !mesh_of(w, k).lossy()) continue;
-        if (!mode.tree && (bound & by_active_set)) continue;
-        state = stuck;
+    for (int k = w.model.pairs; k < w.model.contact_bytes; ++k) {
+        if (contact[k] == stuck || !mode.bound[k] || !mesh_of(w, k - w.model.pairs).lossy()) continue;
+        contact[k] = stuck;
         changed = true;
     }
     return changed;
@@ -133,17 +136,24 @@ bool engage_and_release(Work& w, Sample& s) {
     return changed;
 }
 
-// The locked pair that is loaded furthest beyond its static capacity, and how far.
-struct Overload {
+// Of a locked pair ([Algin] eq. (12)). Capacities may be as small as the rounding of torques.
+bool is_overloaded(const Work& w, int pair, const Sample& s) {
+    if (pair < 0) return false;
+    const double torque = std::fabs(s.torque[pair]);
+    return torque > overload * s.holding[pair] && torque > 1e-11 * torque_scale(w, s);
+}
+
+// The locked pair that uses most of its static capacity.
+struct Use {
     int pair = -1;
-    double use = overload;  // torque over capacity
+    double share = 0;  // torque over capacity
 };
-Overload most_overloaded(const Work& w, const Sample& s) {
-    Overload worst;
+Use most_used(const Work& w, const Sample& s) {
+    Use worst;
     for (int k = 0; k < w.model.pairs; ++k) {
         if (w.contact[k] != locked) continue;
         const double use = std::fabs(s.torque[k]) / s.holding[k];
-        if (use > worst.use) worst = {k, use};
+        if (use > worst.share && (use <= overload || is_overloaded(w, k, s))) worst = {k, use};
     }
     return worst;
 }
@@ -151,33 +161,33 @@ Overload most_overloaded(const Work& w, const Sample& s) {
 // Meshes that leaned on their losses begin anew: which way they go now, release_drive() finds out.
 void open(Work& w, const Mode& mode, int pair, Sample& s) {
     for (int k = w.model.pairs; k < w.model.contact_bytes; ++k) {
-        if ((mode.bound[k] & by_active_set) && mesh_of(w, k - w.model.pairs).lossy()) w.contact[k] = stuck;
+        if (mode.bound[k] && mesh_of(w, k - w.model.pairs).lossy()) w.contact[k] = stuck;
     }
     log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], s.holding[pair], 0);
     w.contact[pair] = slipping(s.torque[pair]);
     contact_forces(w, w.contact, s);
 }
 
-// A lossy mesh at rest between closed pairs takes any loss torque up to the limit of either direction: the machine
-// stands as long as some split of the torques is within everybody's limits. So before a pair opens, the mesh
-// that relieves the worst-loaded pair most is set to its limit. Says whether one was.
+// A lossy mesh that others hold at rest takes any loss torque up to the limit of either direction: the machine stands as
+// long as some split of the torques is within everybody's limits. So before a pair opens, the mesh that relieves
+// the most used pair most is set to its limit. Says whether one was.
 bool lean_on_losses(Work& w, const Mode& mode, double use, Sample& s) {
     const ModelData& m = w.model;
     if (mode.tree) return false;
     unsigned char* trial = w.scratch.trial.data();
     bool found = false, tried = false;
     for (int k = m.pairs; k < m.contact_bytes; ++k) {
-        if (!(mode.bound[k] & by_active_set) || !mesh_of(w, k - m.pairs).lossy()) continue;
+        if (!mesh_of(w, k - m.pairs).lossy() || (w.contact[k] != stuck && !mode.bound[k])) continue;
+        if (!tried) std::copy(s.torque, s.torque + m.torques, w.scratch.torque_copy.data());
+        tried = true;
         for (const double direction : {1., -1.}) {
             if (w.contact[k] != stuck && motion_sign(w.contact[k]) == direction) continue;
-            if (!tried) std::copy(s.torque, s.torque + m.torques, w.scratch.torque_copy.data());
-            tried = true;
             std::copy(w.contact, w.contact + m.contact_bytes, trial);
             trial[k] = moving(direction, w.scratch.torque_copy[static_cast<std::size_t>(k)] * direction < 0 ? -1 : 1);
             contact_forces(w, trial, s);
-            find_directions(w, trial, s);
-            const double relieved = most_overloaded(w, s).use;
-            if (relieved >= use * (1 - 1e-9)) continue;
+            const Mode& leaning = find_directions(w, trial, s);
+            const double relieved = most_used(w, s).share;
+            if (!leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
             use = relieved;
             found = true;
             std::copy(trial, trial + m.contact_bytes, w.scratch.release.data());
@@ -185,8 +195,8 @@ bool lean_on_losses(Work& w, const Mode& mode, double use, Sample& s) {
     }
     if (!tried) return false;
     if (found) std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);
-    std::copy(w.scratch.torque_copy.begin(), w.scratch.torque_copy.end(), s.torque);
     contact_forces(w, w.contact, s);
+    if (!found) internal_torques(w, mode, s);
     return found;
 }
 
@@ -233,7 +243,7 @@ double find_family(Work& w, const Mode& mode, int leader, signed char* part) {
         part[k] = slips(w.contact[k]) && mode.bound[k] ? relation(pair_links(w, k)) : static_cast<signed char>(0);
     }
     for (int k = 0; k < m.meshes; ++k) {
-        const bool candidate = mesh_of(w, k).lossy() && w.contact[m.pairs + k] == stuck;
+        const bool candidate = mesh_of(w, k).lossy() && (w.contact[m.pairs + k] == stuck || mode.bound[m.pairs + k]);
         part[m.pairs + k] = candidate ? relation(mesh_of(w, k).motion()) : static_cast<signed char>(0);
     }
     return mobility;
@@ -326,7 +336,7 @@ bool violated(const Work& w, const Mode& mode, int device, const Sample& end) {
     const ModelData& m = w.model;
     const unsigned char state = w.contact[device];
     if (device < m.pairs) {
-        if (state == locked) return std::fabs(end.torque[device]) > overload * end.holding[device];
+        if (state == locked) return is_overloaded(w, device, end);
         if (state == free_running || mode.bound[device]) return false;
     } else if (state == stuck || mode.bound[device] || !mesh_of(w, device - m.pairs).lossy()) {
         return false;
@@ -357,7 +367,7 @@ void close(Work& w, int device, Sample& s) {
         if (slips(w.contact[k]) && mode.bound[k] && !was_bound[k]) set(k);
     }
     for (int k = m.pairs; k < m.contact_bytes; ++k) {
-        if (w.contact[k] != stuck && mode.bound[k] && mesh_of(w, k - m.pairs).lossy()) set(k);
+        if (w.contact[k] != stuck && mode.bound[k] && !was_bound[k] && mesh_of(w, k - m.pairs).lossy()) set(k);
     }
 }
 
@@ -402,6 +412,7 @@ double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
 // With x wrong, the acceleration is off by B_r (Ĉ_w − Ĉ_r) M_1, and M_1 grows linearly from the instant of
 // reversal: half of M_1 at the end, over the rest of the part.
 Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
+    if (!w.scratch.turned) return mode;
     const ModelData& m = w.model;
     const Sample& begin = w.scratch.begin;
     Sample& end = w.scratch.end;
@@ -447,9 +458,9 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
         Mode& mode = find_directions(w, w.contact, s, complete);
         if (passes > 2 * w.model.contact_bytes + 2) return mode;
         if (release_stuck_meshes(w, mode, s)) continue;
-        const Overload worst = most_overloaded(w, s);
-        if (worst.pair < 0) return mode;
-        if (!lean_on_losses(w, mode, worst.use, s)) open(w, mode, worst.pair, s);
+        const Use worst = most_used(w, s);
+        if (!is_overloaded(w, worst.pair, s)) return mode;
+        if (!lean_on_losses(w, mode, worst.share, s)) open(w, mode, worst.pair, s);
     }
 }
 
@@ -509,12 +520,17 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         const double theta = before / (before - drive);
         if (first.device < 0 || theta < first.theta) first = {m.pairs + leader, theta, Change::release};
     }
-    if (mode.tree || mode.ledger_parts == 1) return first;
-    const double negligible = 1e-6 * torque_scale(w, end);
+    w.scratch.turned = false;
+    double size = 0;
+    const double small = mode.ledger_parts == 1 ? small_loss : small_loss_of_swings;
     for (int k = m.pairs; k < m.contact_bytes; ++k) {
         if (w.contact[k] == stuck || mode.bound[k] || !mesh_of(w, k - m.pairs).lossy()) continue;
         const double g1 = turning_margin(w, k, end);
-        if (g1 >= -negligible) continue;
+        if (g1 >= 0) continue;
+        w.scratch.turned = true;
+        if (mode.tree) continue;
+        if (size == 0) size = torque_scale(w, end);
+        if (g1 * loss_difference(mesh_of(w, k - m.pairs)) >= -small * size) continue;
         if (!middle_known) internal_torques(w, mode, w.scratch.half);
         middle_known = true;
         const double g0 = turning_margin(w, k, begin), gm = turning_margin(w, k, w.scratch.half);
@@ -528,7 +544,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
 void change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
     if (device < w.model.pairs && w.contact[device] == locked) {
         const Mode& mode = find_mode(w.model, w.operators, w.contact, w.scratch);
-        if (!lean_on_losses(w, mode, overload, s)) open(w, mode, device, s);
+        if (!lean_on_losses(w, mode, most_used(w, s).share, s)) open(w, mode, device, s);
     } else {
         close(w, device, s);
     }

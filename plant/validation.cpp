@@ -355,10 +355,11 @@ void validate(const Description& d) {
     for (const BrixiusTyre& t : d.tyres) joints.translating("tyre", t.name, "body", t.body);
     for (const Road& road : d.roads) joints.translating("road", road.name, "body", road.body);
     for (const Plough& p : d.ploughs) joints.translating("plough", p.name, "body", p.body);
-    if (d.maximum_events < 1) {
-        throw ModelError("model", d.name, "maximum_events",
-                         "= " + std::to_string(d.maximum_events) + "; must be >= 1");
-    }
+    const auto at_least_one = [&](const char* field, int value) {
+        if (value < 1) throw ModelError("model", d.name, field, "= " + std::to_string(value) + "; must be >= 1");
+    };
+    at_least_one("maximum_events", d.maximum_events);
+    at_least_one("maximum_parts", d.maximum_parts);
     if (d.oil) {
         const Check check("oil", "oil");
         check.positive("viscosity_at_zero", d.oil->viscosity_at_zero);

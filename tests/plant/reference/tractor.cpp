@@ -146,6 +146,7 @@ TractorShift tractor_shift(Shift shift, const Estimates& estimates) {
     result.shift = shift;
     result.throttle = (1840.0 - 900) / 1291;
     Description& d = result.description;
+    d.maximum_parts = 1;  // the order of the scheme is to be seen
     d.name = "tractor, F2 to F3 under the plough";
     const auto rotating = [&](const char* name, double inertia) {
         d.masses.push_back({.name = name, .inertia = inertia});
