@@ -23,10 +23,10 @@ constexpr double hang_depth = 40;    // between things that hang below or stand 
 constexpr double line_height = 18;
 
 constexpr const char* style = R"(<style>
-.driveline{font:11px system-ui,sans-serif;--i:var(--ink,#1c2430);--p:var(--paper,#fff);--m:var(--muted,#5b6675)}
+.driveline{font:12.5px system-ui,sans-serif;--i:var(--ink,#1c2430);--p:var(--paper,#fff);--m:var(--muted,#5b6675)}
 .driveline text{fill:var(--i);text-anchor:middle}
-.driveline .figure,.driveline .role{fill:var(--m);font-size:9px}
-.driveline .value{font-size:10px;font-variant-numeric:tabular-nums}
+.driveline .figure,.driveline .role{fill:var(--m);font-size:9.5px}
+.driveline .value{font-size:11px;font-variant-numeric:tabular-nums}
 .driveline .mass rect{fill:var(--p);stroke:var(--i);stroke-width:1.5}
 .driveline .link{fill:none;stroke:var(--m);stroke-width:1.5}
 .driveline .device path,.driveline .device circle{fill:none;stroke:var(--i);stroke-width:1.8}

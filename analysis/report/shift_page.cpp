@@ -14,7 +14,7 @@ namespace {
 // "peak_acceleration_change_m_s2" → {"peak acceleration change", "m/s²"}.
 std::pair<std::string, std::string> label_and_unit(const std::string& name) {
     static constexpr std::array<std::pair<std::string_view, std::string_view>, 11> suffixes = {{
-        {"_m_s1_75", "m/s^1.75"},
+        {"_m_s1_75", "m/s¹·⁷⁵"},
         {"_m_s2", "m/s²"},
         {"_m_s3", "m/s³"},
         {"_rad_s", "rad/s"},

@@ -42,7 +42,9 @@ Collector::Collector(const Rig& rig, std::int64_t ticks, const CollectorOptions&
     capacity_ = static_cast<std::size_t>(ticks);
     if (!fits(signals_.size())) capacity_ = options.most_bytes / sizeof(double) / (signals_.size() + 1);
 
-    rows_.resize(capacity_ * (signals_.size() + 1));
+    const std::size_t room = capacity_ * (signals_.size() + 1);
+    rows_ = std::make_unique_for_overwrite<double[]>(room);
+    if (options.touched) std::fill_n(rows_.get(), room, 0.0);
     plant_events_.reserve(options.most_events);
     rig_events_.reserve(options.most_events);
 }
@@ -63,14 +65,18 @@ void Collector::take(const Rig& rig) SHIFTRIG_REALTIME {
 
 analysis::Run Collector::finish(const Rig& rig) {
     analysis::Run run;
-    run.time.resize(count_);
-    for (const int signal : signals_) run.columns.push_back({rig.signals().signal(signal), std::vector<double>(count_)});
-    const double* row = rows_.data();
-    for (std::size_t i = 0; i < count_; ++i) {
-        run.time[i] = *row++;
-        for (auto& column : run.columns) column.value[i] = *row++;
+    run.time.reserve(count_);
+    for (const int signal : signals_) run.columns.push_back({rig.signals().signal(signal), {}});
+    for (auto& column : run.columns) column.value.reserve(count_);
+    const std::size_t width = signals_.size() + 1;
+    constexpr std::size_t batch = 64;  // ticks that stay in the cache while they are turned over
+    for (std::size_t first = 0; first < count_; first += batch) {
+        const std::size_t end = std::min(first + batch, count_);
+        for (std::size_t i = first; i < end; ++i) run.time.push_back(rows_[i * width]);
+        for (std::size_t c = 0; c < run.columns.size(); ++c)
+            for (std::size_t i = first; i < end; ++i) run.columns[c].value.push_back(rows_[i * width + c + 1]);
     }
-    rows_ = {};
+    rows_.reset();
     const auto& devices = rig.model().device_names();
     for (const auto& event : plant_events_)
         run.changes.push_back({event, event.device >= 0 ? devices[static_cast<std::size_t>(event.device)] : "",

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@ namespace shiftrig::rig {
 
 struct CollectorOptions {
     std::size_t most_bytes = std::size_t{256} << 20;
+    bool touched = true;  // the memory is in place before the first tick; false: where no clock runs, it comes as it is used
     std::size_t most_events = 100'000;
     std::vector<std::string> only;  // keep these signals only; empty: all
 };
@@ -33,7 +35,7 @@ class Collector {
     std::vector<int> signals_;
     std::vector<plant::Event> plant_events_;
     std::vector<RigEvent> rig_events_;
-    std::vector<double> rows_;  // time and signals, tick by tick: few cache lines in the loop; columns are made afterwards
+    std::unique_ptr<double[]> rows_;  // time and signals, tick by tick: few cache lines in the loop; columns are made afterwards
     std::size_t capacity_ = 0, count_ = 0;  // ticks
     std::int64_t left_out_ = 0, events_left_out_ = 0;
 };

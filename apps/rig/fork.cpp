@@ -5,6 +5,7 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "apps/rig/snapshot.h"
@@ -28,11 +29,13 @@ class Brancher {
             throw io::InputError(
                 "the snapshot's controller was not the built-in one: its state is not in the snapshot");
         if (!setup_.buses.calibration_path.empty())
-            calibration_text_ = io::read_text(setup_.buses.calibration_path);
+            calibration_.emplace(io::read_text(setup_.buses.calibration_path), setup_.buses.calibration_path);
         for (const auto& v : plan.variations()) rebuilds_ = rebuilds_ || v.target == Variation::Target::model;
+        if (rebuilds_) model_.emplace(snapshot.model_text, snapshot.model_path);
         for (const auto& v : plan.variations())
             recalibrates_ = recalibrates_ || v.target == Variation::Target::calibration;
         rig_ = std::make_unique<Rig>(setup_);
+        resume(*rig_, snapshot);  // if it does not fit, no branch can run
         ticks_ = std::llround(options.duration * 1e9 / static_cast<double>(setup_.tick_ns));
         for (const auto& v : plan.variations())
             signals_.push_back(v.target == Variation::Target::signal ? find(v.name) : Settable{});
@@ -94,24 +97,22 @@ class Brancher {
     void prepare(const std::vector<double>& values) {
         const auto& variations = plan_.variations();
         if (rebuilds_) {
-            YamlVariant model(snapshot_.model_text, snapshot_.model_path);
             for (std::size_t i = 0; i < values.size(); ++i)
                 if (variations[i].target == Variation::Target::model)
-                    model.set(variations[i].name, values[i], variations[i].relative);
+                    model_->set(variations[i].name, values[i], variations[i].relative);
             Setup setup = setup_;
-            setup.model = io::parse_model(model.text(), snapshot_.model_path);
+            setup.model = io::parse_model(model_->text(), snapshot_.model_path);
             for (const auto& [gear, option] : snapshot_.overrides)
                 io::select_option(setup.model.description, gear, option);
             rig_ = std::make_unique<Rig>(std::move(setup));
         }
         resume(*rig_, snapshot_);
         if (recalibrates_) {
-            YamlVariant calibration(calibration_text_, setup_.buses.calibration_path);
             for (std::size_t i = 0; i < values.size(); ++i)
                 if (variations[i].target == Variation::Target::calibration)
-                    calibration.set(variations[i].name, values[i], variations[i].relative);
+                    calibration_->set(variations[i].name, values[i], variations[i].relative);
             rig_->buses().recalibrate(
-                tcu::parse_calibration(calibration.text(), setup_.buses.calibration_path));
+                tcu::parse_calibration(calibration_->root(), setup_.buses.calibration_path));
         }
         for (std::size_t i = 0; i < values.size(); ++i) {
             if (variations[i].target != Variation::Target::signal) continue;
@@ -146,7 +147,7 @@ class Brancher {
     const Setup setup_;
     const analysis::Limits limits_;
     analysis::Run run_;
-    std::string calibration_text_;
+    std::optional<YamlVariant> calibration_, model_;  // of each branch anew: every branch sets the same keys
     bool rebuilds_ = false, recalibrates_ = false;
     std::unique_ptr<Rig> rig_;
     std::int64_t ticks_ = 0;

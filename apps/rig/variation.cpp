@@ -132,7 +132,8 @@ void YamlVariant::set(const std::string& key, double value, bool relative) {
     double present = 0;
     if (!node.IsScalar() || !YAML::convert<double>::decode(node, present))
         throw io::InputError(path_ + ": \"" + key + "\" is not a number");
-    node = relative ? value * present : value;
+    const double original = original_.try_emplace(key, present).first->second;
+    node = relative ? value * original : value;
 }
 
 std::string YamlVariant::text() const {

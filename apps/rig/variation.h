@@ -12,6 +12,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -46,17 +47,20 @@ class Plan {
     bool random_;
 };
 
-// A YAML document with the number at `path` ("shift.inertia_time_s") replaced, merge keys resolved. `relative`:
-// multiplied. Throws InputError if there is no number.
+// A YAML document with numbers replaced, merge keys resolved; read once, varied as often as wanted.
 class YamlVariant {
   public:
     YamlVariant(const std::string& text, const std::string& path);
+    // The number at `key` ("shift.inertia_time_s"). `relative`: times what it is in the document. Throws InputError if there
+    // is no number.
     void set(const std::string& key, double value, bool relative);
+    const YAML::Node& root() const noexcept { return root_; }
     std::string text() const;
 
   private:
     std::string path_;
     YAML::Node root_;
+    std::map<std::string, double> original_;  // of what has been replaced
 };
 
 }  // namespace shiftrig::rig

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "analysis/report/shift_page.h"
 #include "apps/rig/variation.h"
@@ -44,7 +43,7 @@ Dashboard::Dashboard(rig::Rig& rig, DashboardOptions options) : rig_(rig), optio
         options_.http, feed_,
         Handlers{[this] { return model_json(); },
                  [this](std::string_view verb, const std::string& body) { return command(verb, body); },
-                 [this] { return recording_bytes(); }});
+                 [this] { return recording(); }});
     feeder_ = std::thread([this] { feed(); });
 }
 
@@ -321,17 +320,10 @@ void Dashboard::tell(const std::string& text) {
     feed_.change("change", json{{"text", text}}.dump());
 }
 
-std::string Dashboard::recording_bytes() const {
-    std::string path;
-    {
-        const std::lock_guard lock(mutex_);
-        path = recorded_to_;
-    }
-    if (path.empty()) return "";
-    std::ifstream in(path, std::ios::binary);
-    std::ostringstream bytes;
-    bytes << in.rdbuf();
-    return bytes.str();
+std::unique_ptr<std::istream> Dashboard::recording() const {
+    const std::lock_guard lock(mutex_);
+    if (recorded_to_.empty()) return nullptr;
+    return std::make_unique<std::ifstream>(recorded_to_, std::ios::binary);
 }
 
 }  // namespace shiftrig::serve

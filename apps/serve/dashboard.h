@@ -75,7 +75,7 @@ class Dashboard {
     // In HTTP threads.
     std::string command(std::string_view verb, const std::string& body);
     std::string model_json() const;
-    std::string recording_bytes() const;
+    std::unique_ptr<std::istream> recording() const;
     void between_stretches(std::function<void()> what);
     void begin_recording();
     void set_parameter(const std::string& name, double value);

@@ -20,6 +20,7 @@ namespace shiftrig::serve {
 namespace {
 
 constexpr auto heartbeat = std::chrono::milliseconds(1000);
+constexpr std::size_t longest_command = 4096;  // bytes of a POST
 
 bool is_loopback(const std::string& address) {
     in_addr v4{};
@@ -103,7 +104,7 @@ struct HttpServer::Implementation {
 
     void declare() {
         server.new_task_queue = [] { return new httplib::ThreadPool(most_viewers + 80); };
-        server.set_payload_max_length(4096);
+        server.set_payload_max_length(longest_command);
         server.set_keep_alive_max_count(50);
         server.set_keep_alive_timeout(1);
         server.set_read_timeout(1);
@@ -128,6 +129,13 @@ struct HttpServer::Implementation {
             response.set_content(why + "\n", "text/plain");
             return httplib::Server::HandlerResponse::Handled;
         });
+        server.set_error_handler([](const httplib::Request&, httplib::Response& response) {
+            if (!response.body.empty()) return;
+            response.set_content(response.status == 404   ? "there is nothing of this name here\n"
+                                 : response.status == 413 ? "a command has at most " + std::to_string(longest_command) + " bytes\n"
+                                                          : std::string("this is no request that the dashboard understands\n"),
+                                 "text/plain");
+        });
         server.Get("/", [](const httplib::Request&, httplib::Response& response) {
             response.set_content(dashboard_page.data(), dashboard_page.size(), "text/html; charset=utf-8");
         });
@@ -137,14 +145,21 @@ struct HttpServer::Implementation {
         server.Get("/api/live",
                    [this](const httplib::Request&, httplib::Response& response) { answer_live(response); });
         server.Get("/api/recording", [this](const httplib::Request&, httplib::Response& response) {
-            const std::string bytes = handlers.recording();
-            if (bytes.empty()) {
+            std::shared_ptr<std::istream> recording = handlers.recording();
+            if (!recording) {
                 response.status = 404;
                 response.set_content("nothing has been recorded: press Record first\n", "text/plain");
                 return;
             }
             response.set_header("Content-Disposition", "attachment; filename=\"shiftrig.lcm\"");
-            response.set_content(bytes, "application/octet-stream");
+            response.set_chunked_content_provider(  // piece by piece: it may be gigabytes
+                "application/octet-stream", [recording](std::size_t, httplib::DataSink& sink) {
+                    char piece[65536];
+                    const auto count = recording->read(piece, sizeof piece).gcount();
+                    if (count > 0) return sink.write(piece, static_cast<std::size_t>(count));
+                    sink.done();
+                    return true;
+                });
         });
         server.Post(R"(/api/([a-z]+))", [this](const httplib::Request& request, httplib::Response& response) {
             const std::string wrong = handlers.command(request.matches[1].str(), request.body);

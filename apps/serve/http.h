@@ -9,6 +9,7 @@
 #pragma once
 
 #include <functional>
+#include <istream>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -27,8 +28,8 @@ struct Handlers {
     std::function<std::string()> model;  // JSON of GET /api/model
     // POST /api/<verb> with its JSON body; returns what is wrong with it, or nothing.
     std::function<std::string(std::string_view verb, const std::string& body)> command;
-    // Bytes of the recording so far, or nothing if none was made.
-    std::function<std::string()> recording;
+    // The recording so far, or nullptr if none was made.
+    std::function<std::unique_ptr<std::istream>()> recording;
 };
 
 class HttpServer {

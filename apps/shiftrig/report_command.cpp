@@ -12,6 +12,7 @@
 #include "analysis/report/shift_page.h"
 #include "apps/shiftrig/command.h"
 #include "io/recording/reader.h"
+#include "io/recording/rebuild.h"
 
 namespace shiftrig::cli {
 
@@ -28,7 +29,10 @@ std::vector<std::string> wanted_signals(const std::string& recording) {
     std::vector<plant::Signal> all = manifest.inputs;
     all.insert(all.end(), manifest.outputs.begin(), manifest.outputs.end());
     all.insert(all.end(), manifest.rig.begin(), manifest.rig.end());
-    return analysis::report_signals(all);
+    std::vector<std::string> wanted = analysis::report_signals(all);
+    for (auto& name : analysis::scorecard_signals(io::recorded_model_file(manifest).description))
+        wanted.push_back(std::move(name));
+    return wanted;
 }
 
 int run(const Options& options) {

@@ -9,6 +9,7 @@
 #include <iostream>
 #include <memory>
 #include <mutex>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <thread>
@@ -44,13 +45,41 @@ std::vector<std::string> read_signals(const rig::Rig& rig) {
     return names;
 }
 
-analysis::TestResult run_one(const Options& options, const analysis::Limits& limits,
-                             const std::string& path) {
+// A scenario's file as read, or what is wrong with it.
+struct Case {
+    std::string path;
+    std::optional<io::ScenarioFile> scenario{};
+    std::string error{};
+};
+
+Case read_case(const std::string& path) {
+    Case each{path};
+    try {
+        each.scenario = io::read_scenario(path);
+    } catch (const std::exception& error) {
+        each.error = error.what();
+    }
+    return each;
+}
+
+// Longest first: the last to end should be a short one.
+std::vector<std::size_t> by_duration(const std::vector<Case>& cases) {
+    const auto duration = [&](std::size_t i) { return cases[i].scenario ? cases[i].scenario->duration : 0; };
+    std::vector<std::size_t> order(cases.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return duration(a) > duration(b); });
+    return order;
+}
+
+analysis::TestResult run_one(const Options& options, const analysis::Limits& limits, const Case& each) {
     analysis::TestResult result;
-    result.file = path;
+    result.file = result.name = each.path;
+    result.error = each.error;
+    if (!each.scenario) return result;
+    const io::ScenarioFile& scenario = *each.scenario;
+    const std::string& path = each.path;
     const auto start = Clock::now();
     try {
-        io::ScenarioFile scenario = io::read_scenario(path);
         result.name = scenario.name;
         result.expectations = analysis::count_expectations(scenario.expect);
         rig::Choices choices = options.choices;
@@ -61,6 +90,7 @@ analysis::TestResult run_one(const Options& options, const analysis::Limits& lim
         rig::CollectorOptions keep;
         keep.only = read_signals(rig);
         keep.most_bytes = std::size_t{2} << 30;
+        keep.touched = options.pacing() == rt::Pace::wall;
         rig::Collector collector(rig, loop.slots, keep);
         rig::SessionOptions session_options;
         session_options.loop = loop;
@@ -90,7 +120,6 @@ analysis::TestResult run_one(const Options& options, const analysis::Limits& lim
         }
     } catch (const std::exception& error) {
         result.error = error.what();
-        if (result.name.empty()) result.name = path;
     }
     result.wall_time_s = seconds_since(start);
     return result;
@@ -117,14 +146,18 @@ int run(const Options& options) {
     const int jobs = alone ? 1 : options.jobs;
 
     const bool terminal = isatty(STDERR_FILENO) != 0;
-    std::vector<analysis::TestResult> results(options.scenarios.size());
+    std::vector<Case> cases;
+    for (const auto& path : options.scenarios) cases.push_back(read_case(path));
+    const std::vector<std::size_t> order = by_duration(cases);
+    std::vector<analysis::TestResult> results(cases.size());
     std::atomic<std::size_t> next{0};
     std::size_t done = 0;
     std::mutex telling;
     const auto start = Clock::now();
     const auto work = [&] {
-        for (std::size_t i; (i = next++) < results.size();) {
-            results[i] = run_one(options, limits, options.scenarios[i]);
+        for (std::size_t n; (n = next++) < order.size();) {
+            const std::size_t i = order[n];
+            results[i] = run_one(options, limits, cases[i]);
             const std::lock_guard lock(telling);
             ++done;
             if (terminal) std::fprintf(stderr, "\r\033[K");

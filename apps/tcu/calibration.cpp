@@ -132,12 +132,11 @@ void fields(Fields& f, Calibration& c) {
     f.object("bus", c.bus, "conventions of the messages");
 }
 
-Calibration read_calibration(const std::string& path) { return parse_calibration(io::read_text(path), path); }
+Calibration read_calibration(const std::string& path) { return parse_calibration(io::parse_yaml(io::read_text(path), path), path); }
 
-Calibration parse_calibration(const std::string& text, const std::string& path) {
+Calibration parse_calibration(const YAML::Node& root, const std::string& path) {
     Calibration calibration;
     io::ReadContext context{path, {}};
-    const YAML::Node root = io::parse_yaml(text, path);
     io::FieldReader reader(context, root, root.Mark(), "", "");
     fields(reader, calibration);
     reader.finish();

@@ -9,6 +9,10 @@
 
 #include "plant/realtime.h"
 
+namespace YAML {
+class Node;
+}
+
 namespace shiftrig::tcu {
 
 inline constexpr int clutch_count = 5;  // F1, F2, F3, F4, FR
@@ -98,6 +102,6 @@ struct Calibration {
 
 // Throws io::InputError naming file, line, key and rule.
 Calibration read_calibration(const std::string& path);
-Calibration parse_calibration(const std::string& text, const std::string& path);
+Calibration parse_calibration(const YAML::Node& root, const std::string& path);  // `path` for messages and relative names
 
 }  // namespace shiftrig::tcu

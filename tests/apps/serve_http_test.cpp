@@ -4,8 +4,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -54,7 +56,7 @@ class Http : public testing::Test {
                     last = std::string(verb) + body;
                     return std::string(verb == "input" ? "" : "no such command");
                 },
-                [] { return std::string(); }};
+                [this] { return recorded.empty() ? nullptr : std::make_unique<std::istringstream>(recorded); }};
     }
     std::string host() const { return "Host: 127.0.0.1:" + std::to_string(server.port()) + "\r\n"; }
     std::string ask(const std::string& request) const {
@@ -70,7 +72,7 @@ class Http : public testing::Test {
 
     Feed feed;
     std::atomic<int> commands{0};
-    std::string last;
+    std::string last, recorded;
     HttpServer server{{"127.0.0.1", 0, ""}, feed, handlers()};
 };
 
@@ -108,6 +110,17 @@ TEST_F(Http, NoRequestBecomesAFileName) {
          {"/../../etc/passwd", "/etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/api/recording/../x"})
         EXPECT_NE(ask("GET " + path + " HTTP/1.1\r\n" + host() + "\r\n").find("404"), std::string::npos)
             << path;
+}
+
+TEST_F(Http, ALongRecordingComesWhole) {
+    const std::string request = "GET /api/recording HTTP/1.1\r\n" + host() + "\r\n";
+    EXPECT_NE(ask(request).find("404"), std::string::npos) << "none was made yet";
+    recorded = std::string(300'000, 'r') + "its end";
+    Client client(server.port());
+    client.send(request);
+    const std::string answer = client.read_until("\r\n0\r\n");  // the last of the chunks
+    EXPECT_GE(std::count(answer.begin(), answer.end(), 'r'), 300'000);
+    EXPECT_NE(answer.find("its end"), std::string::npos);
 }
 
 TEST_F(Http, AViewerSeesChangesAndTheNewestSample) {
@@ -155,7 +168,7 @@ TEST_F(Http, AViewerThatNeverReadsHoldsNobodyUp) {
 
 const Handlers silent_handlers{[] { return std::string("{}"); },
                                [](std::string_view, const std::string&) { return std::string(); },
-                               [] { return std::string(); }};
+                               [] { return nullptr; }};
 
 TEST(HttpToken, AnOpenAddressNeedsAToken) {
     Feed feed;

@@ -1,7 +1,7 @@
 // The live dashboard: what the rig says (server-sent events) is shown; what the viewer does is posted.
 // The page keeps no state of its own beyond the last minute of plotted samples.
 import "./style.css";
-import { display, drawing, format, h } from "./dom.js";
+import { display, drawing, format, h, measured } from "./dom.js";
 import { colour } from "./driveline.js";
 import { plotStack } from "./plots.js";
 
@@ -124,6 +124,6 @@ function listen(model, index, view) {
   source.addEventListener("shift", (message) => {
     const s = JSON.parse(message.data);
     view.card.replaceChildren(h("p", {}, h("strong", {}, `${s.from} → ${s.to} `), h("span", { class: `verdict ${s.verdict}` }, s.completed ? s.verdict : "not completed")),
-      h("table", {}, h("tbody", {}, s.metrics.map((m) => h("tr", {}, h("td", {}, m.label), h("td", { class: "number" }, m.value === null ? "–" : `${format(m.value, 3)} ${m.unit}`), h("td", { class: `verdict ${m.verdict}` }, m.verdict))))));
+      h("table", {}, h("tbody", {}, s.metrics.map((m) => h("tr", {}, h("td", {}, m.label), h("td", { class: "number" }, measured(m)), h("td", { class: `verdict ${m.verdict}` }, m.verdict))))));
   });
 }

@@ -32,7 +32,14 @@ export function display(unit, name = "") {
 
 export function format(value, digits = 2) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  return value.toFixed(digits);
+  return value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1");
+}
+
+/** A metric of a shift: as many digits as tell something. */
+export function measured(metric) {
+  if (metric.value === null) return "–";
+  const size = Math.abs(metric.value);
+  return `${format(metric.value, size >= 100 ? 0 : size >= 10 ? 1 : 3)} ${metric.unit}`;
 }
 
 /** Insert an SVG the rig drew itself (driveline), parsed as XML: scripts and handlers are dropped. */

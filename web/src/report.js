@@ -1,7 +1,7 @@
 // The report of one recording: what happened, how good each shift was, and pictures to find out why.
 // Everything stands in the page itself (the JSON in #data); nothing is fetched.
 import "./style.css";
-import { drawing, format, h } from "./dom.js";
+import { drawing, format, h, measured } from "./dom.js";
 import { colour } from "./driveline.js";
 import { plotStack } from "./plots.js";
 
@@ -53,16 +53,15 @@ function scorecard(shifts) {
       h("span", { class: `verdict ${shift.verdict}` }, shift.completed ? shift.verdict : `not completed: ${shift.end}`),
       h("button", { class: "no-print", onclick: () => window.shiftrigPlots?.zoom(shift.command_s - 0.5, shift.end_s + 1) }, "Show in plots")),
     shift.phases.length ? h("p", { class: "faint" }, shift.phases.map((p) => `${p.name} ${format(p.to - p.from, 3)} s`).join(" · ")) : null,
-    h("div", { class: "scroll" }, h("table", {},
+    h("div", { class: "scroll" }, h("table", { class: "scorecard" },
       h("thead", {}, h("tr", {}, h("th", {}, "Metric"), h("th", { class: "number" }, "Value"), h("th", { class: "number" }, "Good"), h("th", { class: "number" }, "Reject"), h("th", {}, "Verdict"))),
       h("tbody", {}, shift.metrics.map((m) => h("tr", {},
-        h("td", {}, m.label), h("td", { class: "number" }, m.value === null ? "–" : `${format(m.value, digits(m.value))} ${m.unit}`),
+        h("td", {}, m.label), h("td", { class: "number" }, measured(m)),
         h("td", { class: "number" }, limit(m.good)), h("td", { class: "number" }, limit(m.reject)),
         h("td", { class: `verdict ${m.verdict}` }, m.verdict))))))));
 }
 
 function limit(value) { return value === null || value === undefined ? "" : `${value}`; }
-function digits(value) { return Math.abs(value) >= 100 ? 0 : Math.abs(value) >= 10 ? 1 : 3; }
 
 function drawPlots(parent, series) {
   const bands = data.shifts.flatMap((s) => (s.phases.length ? s.phases.map((p) => ({ from: p.from, to: p.to, label: p.name })) : [{ from: s.command_s, to: s.end_s, label: `${s.from}→${s.to}` }]));
