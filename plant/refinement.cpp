@@ -6,8 +6,8 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-constexpr double force_tolerance = 1e-4;  // of the largest torque
-constexpr double swing_tolerance = 1e-4;
+constexpr double force_tolerance = 2e-5;  // of the largest torque
+constexpr double swing_tolerance = 2e-5;
 
 double largest_torque(const ModelData& m, const Sample& s) {
     double largest = 0;

@@ -249,9 +249,15 @@ double find_family(Work& w, const Mode& mode, int leader, signed char* part) {
     return mobility;
 }
 
+// Acceleration of a mesh, at rest until now, in the sense in which the sample's contact states take it to move.
+double departure(const Work& w, const unsigned char* contact, int mesh, const Sample& s) {
+    return motion_sign(contact[w.model.pairs + mesh]) * slip_of(mesh_of(w, mesh).motion(), s.rate);
+}
+
 // A family is let go together, each member with the sign that the motion gives it. It goes if, one way and with
-// its own consistent losses, it accelerates that way. Returns the acceleration towards the better of both ways
-// beyond rounding, positive if it goes, with the states it then has in scratch.release; the sample is as before.
+// its own consistent losses, it accelerates that way. Where other stuck meshes hold it only together, one of those goes
+// with it. Returns the acceleration towards the better of all ways beyond rounding, positive if it goes, with the
+// states it then has in scratch.release; the sample is as before.
 double release_drive(Work& w, const Mode& mode, int leader, Sample& s) {
     const ModelData& m = w.model;
     ScratchData& scratch = w.scratch;
@@ -268,29 +274,46 @@ double release_drive(Work& w, const Mode& mode, int leader, Sample& s) {
     for (int k = 0; k < m.pairs; ++k) {
         if (part[k] != 0) s.sliding[k] = std::max(s.sliding[k], s.holding[k]);
     }
-    double best = -std::numeric_limits<double>::infinity();
-    for (const double direction : {1., -1.}) {
+    const auto set = [&](int k, double sign) {
+        const int x = scratch.torque_copy[static_cast<std::size_t>(k)] * sign < 0 ? -1 : 1;
+        trial[k] = k < m.pairs ? slipping(sign) : moving(sign, x);
+    };
+    const auto begin_trial = [&](double direction) {
         std::copy(w.contact, w.contact + m.contact_bytes, trial);
         for (int k = 0; k < m.contact_bytes; ++k) {
-            if (part[k] == 0) continue;
-            const double sign = direction * part[k];
-            const int x = scratch.torque_copy[static_cast<std::size_t>(k)] * sign < 0 ? -1 : 1;
-            trial[k] = k < m.pairs ? slipping(sign) : moving(sign, x);
+            if (part[k] != 0) set(k, direction * part[k]);
         }
+    };
+    double best = -std::numeric_limits<double>::infinity();
+    bool held_together = false;
+    const auto attempt = [&](int partner) {
         contact_forces(w, trial, s);
         const Mode& moving_mode = find_directions(w, trial, s);
-        if (trial[m.pairs + leader] == stuck) continue;
+        held_together = moving_mode.bound[m.pairs + leader] != 0;
+        if (held_together || trial[m.pairs + leader] == stuck) return;
         sample_rate(w, moving_mode, s);
-        const double drive = slip_of(mesh_of(w, leader).motion(), s.rate) * direction - threshold;
-        if (drive > best) {
-            best = drive;
-            std::copy(trial, trial + m.contact_bytes, scratch.release.data());
+        const double drive = departure(w, trial, leader, s) - threshold;
+        if (drive <= best || (partner >= 0 && departure(w, trial, partner, s) <= threshold)) return;
+        best = drive;
+        std::copy(trial, trial + m.contact_bytes, scratch.release.data());
+    };
+    for (const double direction : {1., -1.}) {
+        begin_trial(direction);
+        attempt(-1);
+        if (!held_together || mode.tree) continue;
+        for (int partner = 0; partner < m.meshes; ++partner) {
+            if (w.contact[m.pairs + partner] != stuck || part[m.pairs + partner] != 0 || !mesh_of(w, partner).lossy()) continue;
+            for (const double sign : {1., -1.}) {
+                begin_trial(direction);
+                set(m.pairs + partner, sign);
+                attempt(partner);
+            }
         }
     }
     std::copy(sliding, sliding + m.pairs, s.sliding);
     contact_forces(w, w.contact, s);
     std::copy(scratch.torque_copy.begin(), scratch.torque_copy.end(), s.torque);
-    return best;
+    return std::max(best, -1e10 * threshold);  // held whatever is tried: finite, for the search of an instant
 }
 
 bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
@@ -298,7 +321,7 @@ bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
     const ModelData& m = w.model;
     const double held = s.torque[m.pairs + m.meshes + leader];
     for (int k = m.pairs; k < m.contact_bytes; ++k) {
-        if (w.scratch.family[static_cast<std::size_t>(k)] == 0) continue;
+        if (w.contact[k] != stuck || w.scratch.release[static_cast<std::size_t>(k)] == stuck) continue;
         log_event(w, EventKind::mesh_releases, k, s.at.time, s.torque[k], held, 0);
     }
     std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);

@@ -166,7 +166,8 @@ PlantRun run_plant(const Description& d, const Table& layout, std::uint64_t seed
         flagged = flagged && outputs.certificate.fall_backs >= 0;
         for (int e = 0; e < std::min(outputs.event_count, Outputs::event_capacity); ++e)
             run.table.change_times.push_back(outputs.events[static_cast<std::size_t>(e)].time);
-        moved = std::max(moved, stored_at_start + std::abs(output("energy.dissipated")));
+        moved = std::max({moved, stored_at_start + std::abs(output("energy.dissipated")), output("energy.stored"),
+                          std::abs(output("energy.input"))});
         run.worst_defect = std::max(run.worst_defect, std::abs(output("energy.defect")));
     }
     run.table.unique.assign(run.table.rows.size(), true);
