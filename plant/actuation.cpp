@@ -11,14 +11,6 @@ double input(const Work& w, int index) noexcept {
     return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)];
 }
 
-constexpr int hydraulic_slots = 7;  // HydraulicState in the State block, the delay line behind it
-
-HydraulicState read_hydraulic(const double* at) noexcept { return {at[0], at[1], at[2], at[3], at[4], at[5], at[6]}; }
-void write_hydraulic(double* at, const HydraulicState& s) noexcept {
-    const double values[hydraulic_slots] = {s.play, s.head, s.slewed, s.valve, s.valve_rate, s.piston, s.chamber};
-    std::copy(values, values + hydraulic_slots, at);
-}
-
 StepValues constant(double value) noexcept { return {value, value, value}; }
 StepValues complement(const StepValues& y) noexcept { return {1 - y.begin, 1 - y.middle, 1 - y.end}; }
 
@@ -41,6 +33,27 @@ bool changes(const PairLaw& law, const PairLoad& load) noexcept {
     }
 }
 
+// The load of a pair for the whole step, or its place in the list of those that move.
+void keep_load(Work& w, int pair) {
+    ScratchData& s = w.scratch;
+    const auto i = static_cast<std::size_t>(pair);
+    if (s.loads[i].moves) {
+        s.moving[static_cast<std::size_t>(s.moving_count++)] = pair;
+    } else {
+        s.held[i] = pair_load(w, pair, {w.start, 0, Side::right});
+    }
+}
+
+// The same pressure all the step long.
+void hold_pressure(Work& w, int pair, double pressure) {
+    const auto i = static_cast<std::size_t>(pair);
+    const PairLaw& law = w.model.pair_laws[i];
+    PairLoad& load = w.scratch.loads[i];
+    const bool fixed = stuck_pair(w, law, load);
+    load.moves = false;
+    w.scratch.held[i] = fixed ? load.values.begin : load_from_pressure(law.friction, pressure * load.scale);
+}
+
 }  // namespace
 
 void advance_actuation(Work& w) SHIFTRIG_REALTIME {
@@ -50,12 +63,17 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
     for (int k = 0; k < m.pairs; ++k) {
         const PairLaw& law = m.pair_laws[static_cast<std::size_t>(k)];
         if (!law.hydraulic) continue;
-        demand += fill_demand(*law.hydraulic, w.operators.hydraulics[static_cast<std::size_t>(k)],
-                              law.friction.return_pressure, read_hydraulic(block + law.actuator));
+        const auto i = static_cast<std::size_t>(k);
+        const HydraulicState state = read_hydraulic(block + law.actuator);
+        w.scratch.quiet[i] = !law.hydraulic->solenoid && input(w, law.valve_stuck) <= 0.5 &&
+                             is_quiet(*law.hydraulic, state, static_cast<std::size_t>(law.delay_slots), input(w, law.command));
+        if (w.scratch.quiet[i]) continue;
+        demand += fill_demand(*law.hydraulic, w.operators.hydraulics[i], law.friction.return_pressure, state);
     }
     const double pump = m.description.oil ? m.description.oil->pump_flow : 0;
     const double share = pump > 0 && demand > pump ? pump / demand : 1;
 
+    w.scratch.moving_count = 0;
     for (int k = 0; k < m.pairs; ++k) {
         const auto i = static_cast<std::size_t>(k);
         const PairLaw& law = m.pair_laws[i];
@@ -63,6 +81,7 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
         load.scale = 1;
         if (law.source >= LoadSource::rolling) {  // by nature, not by actuation
             load.moves = load.fixed = false;
+            w.scratch.held[i] = law.full_load;
             continue;
         }
         switch (law.source) {
@@ -76,6 +95,11 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
                 break;
             case LoadSource::hydraulic: {
                 HydraulicState state = read_hydraulic(block + law.actuator);
+                load.scale = 1 - input(w, law.leak);
+                if (w.scratch.quiet[i]) {
+                    hold_pressure(w, k, state.chamber);
+                    continue;
+                }
                 const ActuationHydraulic& hydraulic = *law.hydraulic;
                 double command = input(w, law.command);
                 if (hydraulic.solenoid) command = solenoid_pressure(*hydraulic.solenoid, state.play, command);
@@ -83,7 +107,6 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
                     hydraulic, w.operators.hydraulics[i], law.friction.return_pressure, state,
                     std::span<double>(block + law.actuator + hydraulic_slots, static_cast<std::size_t>(law.delay_slots)),
                     command, share, input(w, law.valve_stuck) > 0.5);
-                load.scale = 1 - input(w, law.leak);
                 write_hydraulic(block + law.actuator, state);
                 break;
             }
@@ -91,13 +114,14 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
         }
         stuck_pair(w, law, load);
         load.moves = changes(law, load);
-        if (!load.moves) load.held = pair_load(w, k, {w.start, 0, Side::right});
+        keep_load(w, k);
     }
 }
 
 void hold_actuation(Work& w) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const double* block = w.state;
+    w.scratch.moving_count = 0;
     for (int k = 0; k < m.pairs; ++k) {
         const auto i = static_cast<std::size_t>(k);
         const PairLaw& law = m.pair_laws[i];
@@ -105,6 +129,7 @@ void hold_actuation(Work& w) SHIFTRIG_REALTIME {
         load.scale = 1;
         if (law.source >= LoadSource::rolling) {
             load.moves = load.fixed = false;
+            w.scratch.held[i] = law.full_load;
             continue;
         }
         switch (law.source) {
@@ -112,19 +137,20 @@ void hold_actuation(Work& w) SHIFTRIG_REALTIME {
             case LoadSource::input: load.values = constant(input(w, law.command)); break;
             case LoadSource::release: load.values = constant(1 - block[law.actuator]); break;
             case LoadSource::apply: load.values = constant(block[law.actuator]); break;
-            case LoadSource::hydraulic: {
-                const HydraulicState state = read_hydraulic(block + law.actuator);
-                load.hydraulic = {};
-                load.hydraulic.valve = constant(state.chamber);
+            case LoadSource::hydraulic:
                 load.scale = 1 - input(w, law.leak);
-                break;
-            }
+                hold_pressure(w, k, read_hydraulic(block + law.actuator).chamber);
+                continue;
             default: break;
         }
         stuck_pair(w, law, load);
         load.moves = law.source == LoadSource::waveform && !load.fixed;
-        if (!load.moves) load.held = pair_load(w, k, {w.start, 0, Side::right});
+        keep_load(w, k);
     }
+}
+
+double chamber_pressure(const double* block, const PairLaw& law) SHIFTRIG_REALTIME {
+    return read_hydraulic(block + law.actuator).chamber;
 }
 
 double pair_load(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {

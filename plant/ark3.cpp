@@ -48,6 +48,7 @@ void middle_sample(Work& w, const Mode& mode) {
         half.auxiliary[i] = 0.5 * (begin.auxiliary[i] + end.auxiliary[i]) +
                             h / 8 * (begin.auxiliary_rate[i] - end.auxiliary_rate[i]);
     }
+    tree_slips(w.model, mode, half);
     evaluate_forces(w, w.contact, half);
 }
 
@@ -122,6 +123,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
             stage.auxiliary[a] = begin.auxiliary[a] + h * change;
         }
         show_speeds(t, v.stage_speed, stage.z);
+        tree_slips(m, mode, stage);
         evaluate_forces(w, w.contact, stage, Extent::moving_pairs);
         group_forces(t, stage.f, v.stage_force[i - 1]);
         std::copy(stage.auxiliary_rate, stage.auxiliary_rate + m.auxiliary, v.auxiliary[i]);
@@ -148,6 +150,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
         end.auxiliary[a] = begin.auxiliary[a] + h * change;
     }
     write_state(m, t, v.end, end.z);
+    tree_slips(m, mode, end);
     end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
     evaluate_forces(w, w.contact, end);
     group_forces(t, end.f, v.end.force);
@@ -176,6 +179,7 @@ double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
                                 h / 8 * (s.begin.auxiliary_rate[i] - s.end.auxiliary_rate[i]);
     }
     show_speeds(t, v.other.speed, s.middle.z);
+    tree_slips(m, mode, s.middle);
     for (int j : m.translating) {
         const int g = t.group[m.tree->position[static_cast<std::size_t>(j)]];
         s.end.rate[j] = t.ratio[m.tree->position[static_cast<std::size_t>(j)]] *

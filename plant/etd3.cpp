@@ -18,39 +18,41 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     Sample &begin = s.begin, &half = s.half, &late = s.late, &end = s.end;
     const bool whole = begin.at.fraction == 0 && end_fraction == 1;
     const double h = (end_fraction - begin.at.fraction) * w.h;
-    StepOperators part = place_operators(m, s.operator_memory.data());
-    if (!whole) build_step_operators(m, mode, h, part, s.workspace.data());
-    const StepOperators& op = s.used = whole ? mode.step : part;
-
-    const int rows = m.states_padded;
+    if (whole) {
+        s.used = mode.step;
+    } else {
+        s.used = build_step_operators(m, mode, h, s.operator_memory.data(), s.workspace.data());
+    }
+    const StepOperators& op = s.used;
     const auto multiply = m.kernel.multiply;
     const double middle = 0.5 * (begin.at.fraction + end_fraction);
     half.at = {w.start + middle * w.h, middle, Side::right};
     late.at = end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
 
-    multiply(op.half, rows, m.columns, begin.z, nullptr, half.z);
+    // One block of coordinates each for half way, the late stage and the end: first what the beginning gives to all
+    // three, then what each stage adds to those after it.
+    const int block = padded(mode.order);
+    double* const at_half = s.vector_a.data();
+    double* const at_late = at_half + block;
+    double* const at_end = at_late + block;
+    multiply(op.from_begin, 3 * block, mode.order + m.forces, read_coordinates(mode, begin), nullptr, at_half);
     for (int i = 0; i < m.auxiliary; ++i) half.auxiliary[i] = begin.auxiliary[i] + 0.5 * h * begin.auxiliary_rate[i];
+    show(m, mode, at_half, half);
     evaluate_forces(w, w.contact, half);
 
-    double* transported = s.vector_a.data();
-    double* extrapolated = s.vector_b.data();
-    multiply(op.whole, rows, m.states, begin.z, nullptr, transported);
-    for (int k = 0; k < m.forces; ++k) extrapolated[k] = 2 * half.f[k] - begin.f[k];
-    multiply(op.first, rows, m.forces, extrapolated, transported, late.z);
+    multiply(op.from_half, 2 * block, m.forces, half.f, at_late, at_late);
     for (int i = 0; i < m.auxiliary; ++i) {
         late.auxiliary[i] = begin.auxiliary[i] + h * (2 * half.auxiliary_rate[i] - begin.auxiliary_rate[i]);
     }
+    show(m, mode, at_late, late);
     evaluate_forces(w, w.contact, late, Extent::moving_pairs);
 
-    double* forces = s.vector_c.data();
-    std::copy(begin.f, begin.f + m.forces, forces);
-    std::copy(half.f, half.f + m.forces, forces + m.forces);
-    std::copy(late.f, late.f + m.forces, forces + 2 * m.forces);
-    multiply(op.combined, rows, 3 * m.forces, forces, transported, end.z);
+    multiply(op.from_late, block, m.forces, late.f, at_end, at_end);
     for (int i = 0; i < m.auxiliary; ++i) {
         end.auxiliary[i] = begin.auxiliary[i] + h / 6 * (begin.auxiliary_rate[i] + 4 * half.auxiliary_rate[i] +
                                                          late.auxiliary_rate[i]);
     }
+    show(m, mode, at_end, end);
     evaluate_forces(w, w.contact, end);
     internal_torques(w, mode, end);
 }

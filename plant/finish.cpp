@@ -122,60 +122,18 @@ void for_rows(const ModelData& m, const Mode& mode, const Function& function) {
     }
 }
 
-// Residual of [Algin] eq. (15) at the sample: accelerations of the active rows from M̃ and M_R, term by term,
-// relative to the terms.
+// Residual of [Algin] eq. (15) at the sample, relative to the largest torque in it.
 double torque_residual(Work& w, const Mode& mode, const Sample& s) {
     const ModelData& m = w.model;
-    double* torque = w.scratch.vector_a.data();   // on each mass
-    double* size = w.scratch.vector_b.data();     // Σ of magnitudes
-    std::fill(torque, torque + m.masses, 0.);
-    std::fill(size, size + m.masses, 0.);
-    const auto take = [&](const auto& links, double moment) {
-        for (const Link& link : links) {
-            const double part = link.factor * moment;
-            torque[link.mass] -= part;
-            size[link.mass] += std::fabs(part);
-        }
-    };
-    for (int k = 0; k < m.forces; ++k) {
-        if (s.f[k] != 0) take(m.force_on[static_cast<std::size_t>(k)], s.f[k]);
-    }
-    for (std::size_t e = 0; e < m.shaft_rate.size(); ++e) {
-        const Elastic& shaft = m.structure.shafts[e];
-        take(m.shaft_rate[e], shaft.stiffness * s.z[static_cast<std::size_t>(m.masses) + e] +
-                                  shaft.damping * slip_fast(m.shaft_rate[e], s.z));
-    }
-    for (std::size_t e = 0; e < m.damper_rate.size(); ++e) {
-        take(m.damper_rate[e], m.structure.dampers[e].damping * slip_fast(m.damper_rate[e], s.z));
-    }
-    for (int r = 0; r < mode.row_count; ++r) {
-        const int unknown = mode.rows[r];
-        if (unknown < m.pairs) {
-            take(m.pair_slip[static_cast<std::size_t>(unknown)], s.torque[unknown]);
-        } else if (unknown < m.pairs + m.meshes) {
-            const auto k = static_cast<std::size_t>(unknown - m.pairs);
-            const Mesh& mesh = m.structure.meshes[k];
-            const int x = mode.key[unknown] == 0 ? 0 : mode.key[unknown] == 2 ? -1 : 1;
-            take(m.mesh_slip[k], s.torque[unknown]);
-            // û in place of u: the difference lies on the loss column.
-            take(m.mesh_loss[k], (1 - mesh.force_ratio(x) / mesh.ratio) * s.torque[unknown]);
-        } else {
-            take(m.mesh_loss[static_cast<std::size_t>(unknown - m.pairs - m.meshes)], s.torque[unknown]);
-        }
-    }
-    const double* inertia = m.structure.inertia.data();
-    double worst = 0;
-    const auto examine = [&](const auto& links) {
-        double sum = 0, terms = 0;
-        for (const Link& link : links) {
-            const double mobility = link.factor / inertia[link.mass];
-            sum += mobility * torque[link.mass];
-            terms += std::fabs(mobility) * size[link.mass];
-        }
-        if (std::fabs(sum) > worst * terms) worst = std::fabs(sum) / terms;
-    };
-    for_rows(m, mode, examine);
-    return worst;
+    if (mode.row_count == 0) return 0;
+    const int columns = mode.order + m.forces + mode.row_count;
+    const double* terms = s.f - mode.order;  // q, f, M
+    double* rest = w.scratch.vector_a.data();
+    m.kernel.multiply(mode.balance, padded(mode.row_count), columns, terms, nullptr, rest);
+    double scale = 0, worst = 0;
+    for (int c = mode.order; c < columns; ++c) scale = std::max(scale, std::fabs(terms[c]));
+    for (int r = 0; r < mode.row_count; ++r) worst = std::max(worst, std::fabs(rest[r]));
+    return scale > 0 ? worst / scale : 0;
 }
 
 double constraint_violation(const Work& w, const Mode& mode, const double* speeds) {
@@ -221,6 +179,9 @@ Work begin_step(const ModelData& m, OperatorsData& operators, State& state, Outp
         load_sample(m, block, time, scratch.begin);
     }
     std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
+    for (std::size_t e = 0; e < m.engines.size(); ++e) {
+        scratch.engine_modes[e] = static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
+    }
     outputs.certificate.mode_misses = -static_cast<std::int32_t>(operators.misses);
     return {m, operators, block, block, outputs, scratch, contact, time, h};
 }
@@ -229,9 +190,9 @@ bool is_begun(const Work& w) SHIFTRIG_REALTIME {
     if (!w.operators.carried) return false;
     const Sample& s = w.scratch.begin;
     for (int k = 0; k < w.model.pairs; ++k) {
-        if (w.model.pair_laws[static_cast<std::size_t>(k)].source >= LoadSource::rolling) continue;
-        const PairLoad& load = w.scratch.loads[static_cast<std::size_t>(k)];
-        if ((load.moves ? pair_load(w, k, s.at) : load.held) != s.load[k]) return false;
+        const auto i = static_cast<std::size_t>(k);
+        if (w.model.pair_laws[i].source >= LoadSource::rolling) continue;
+        if ((w.scratch.loads[i].moves ? pair_load(w, k, s.at) : w.scratch.held[i]) != s.load[k]) return false;
     }
     return true;
 }
@@ -248,6 +209,9 @@ Work begin_look(const ModelData& m, OperatorsData& operators, const State& state
     operators.carried = false;
     load_sample(m, block, time, scratch.begin);
     std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
+    for (std::size_t e = 0; e < m.engines.size(); ++e) {
+        scratch.engine_modes[e] = static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
+    }
     outputs.certificate.mode_misses = -static_cast<std::int32_t>(operators.misses);
     return {m, operators, block, nullptr, outputs, scratch, scratch.before.data(), time, h};
 }
@@ -267,7 +231,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
 
     w.operators.samples[0] = s.begin;
     w.operators.samples[1] = s.end;
-    w.operators.carried = true;
+    w.operators.carried = s.carries;
     std::copy(w.contact, w.contact + m.contact_bytes, w.operators.carried_contact.begin());
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
         w.operators.carried_modes[e] = block[layout.engines + 3 * static_cast<int>(e)];
@@ -276,7 +240,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     double* old_speeds = s.vector_c.data();
     std::copy(block + layout.speeds, block + layout.speeds + m.masses, old_speeds);
     write_integer(block, read_integer(block) + 1);
-    const double before = stored_energy(m, block + layout.speeds);
+    const double before = stored_energy(m, block + layout.speeds);  // twists follow the speeds
     std::copy(s.begin.z, s.begin.z + m.states, block + layout.speeds);
     std::copy(s.begin.auxiliary, s.begin.auxiliary + m.auxiliary, block + layout.auxiliary);
     advance_sensors(w, old_speeds);
@@ -301,7 +265,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
 void finish_look(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     Sample& s = w.scratch.begin;
     w.outputs.certificate.constraint_violation = constraint_violation(w, mode, s.z);
-    w.outputs.certificate.torque_residual = torque_residual(w, mode, s);
+    w.outputs.certificate.torque_residual = mode.tree ? w.scratch.torque_residual : torque_residual(w, mode, s);
     w.outputs.certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     w.outputs.event_count = 0;
     w.scratch.stored = stored_energy(w.model, s.z);

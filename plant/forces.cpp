@@ -15,63 +15,26 @@ double input(const Work& w, int index) noexcept {
     return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)];
 }
 
-EngineMode engine_mode(const Work& w, std::size_t engine) noexcept {
-    return static_cast<EngineMode>(static_cast<int>(w.state[w.model.layout.engines + 3 * static_cast<int>(engine)]));
-}
-
 // Viscous drag of an open wet clutch.
 double open_drag(const Work& w, int k, const Sample& s) noexcept {
     return drag_torque(w.model.pair_laws[static_cast<std::size_t>(k)].drag, w.operators.oil.viscosity,
-                       slip_fast(w.model.pair_slip[static_cast<std::size_t>(k)], s.z),
-                       w.model.description.oil->drag_speed_limit);
+                       s.slip[k], w.model.description.oil->drag_speed_limit);
 }
 
-// Load of the pairs that no actuator presses; their friction factor is 1. [Nm] or [N]
-double natural_load(const Work& w, int k, const Sample& s) noexcept {
-    const ModelData& m = w.model;
-    const auto i = static_cast<std::size_t>(k);
-    const FrictionPair& pair = m.structure.pairs[i];
-    const int mass = m.pair_slip[i][0].mass;
-    if (pair.kind == PairKind::rolling) return m.pair_laws[i].full_load;
-    if (pair.kind == PairKind::engine_friction) {
-        const auto e = static_cast<std::size_t>(pair.source);
-        return stalled_friction_capacity(m.description.engines[e], engine_mode(w, e), s.z[mass]);
-    }
-    double force = 0;
-    for (std::size_t t = 0; t < m.tyres.size(); ++t) {
-        if (m.tyres[t].body == mass) force += tyre_resistance(w.operators.soils[t], s.tyre_slip[t]);
-    }
-    const double share = m.draft < 0 ? 1 : input(w, m.draft);
-    for (std::size_t p = 0; p < m.plough_mass.size(); ++p) {
-        if (m.plough_mass[p] == mass) force += plough_draft(m.description.ploughs[p], s.z[mass], share);
-    }
-    return force;
-}
-
-// Capacities and force of every pair, [Algin] eq. (11).
-void pair_forces(const Work& w, const unsigned char* contact, Sample& s, Extent extent) noexcept {
+// Capacities and force of every pair from its load, [Algin] eq. (11).
+void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
     const ModelData& m = w.model;
     const PairLaw* laws = m.pair_laws.data();
-    const PairLoad* loads = w.scratch.loads.data();
     for (int k = 0; k < m.pairs; ++k) {
         const PairLaw& law = laws[k];
-        if (extent == Extent::moving_pairs && contact[k] == locked) {
-            s.f[k] = 0;
-            continue;
-        }
-        if (law.source >= LoadSource::rolling) {
-            s.load[k] = s.sliding[k] = s.holding[k] = natural_load(w, k, s);
-            s.f[k] = slip_sign(contact[k]) * s.sliding[k];
-            continue;
-        }
-        const double load = s.load[k] = loads[k].moves ? pair_load(w, k, s.at) : loads[k].held;
+        const double load = s.load[k];
         s.holding[k] = load * law.friction.static_factor;
-        if (contact[k] == locked || load == 0) {
+        if (slips(contact[k]) && load != 0) {
+            s.sliding[k] = sliding_capacity(law.friction, load, s.slip[k]);
+            s.f[k] = slip_sign(contact[k]) * s.sliding[k];
+        } else {
             s.sliding[k] = load * law.sliding_at_rest;
             s.f[k] = contact[k] == free_running && law.drag > 0 ? open_drag(w, k, s) : 0;
-        } else {
-            s.sliding[k] = sliding_capacity(law.friction, load, slip_fast(m.pair_slip[static_cast<std::size_t>(k)], s.z));
-            s.f[k] = slip_sign(contact[k]) * s.sliding[k];
         }
     }
 }
@@ -115,45 +78,58 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
                                       input(w, engine.speed_request), input(w, engine.torque_limit),
                                       input(w, engine.fuel_cut) > 0.5};
     }
+    for (std::size_t i = 0; i < m.road_mass.size(); ++i) {
+        known.grade_forces[i] = grade_force(m.description.roads[i], input(w, m.grade), m.description.gravity);
+    }
+    known.draft = m.draft < 0 ? 1 : input(w, m.draft);
     at_oil_temperature(m, w.operators, input(w, m.oil_temperature));
 }
 
 void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s, Extent extent) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const Description& d = m.description;
-    std::fill(s.f + m.first_external, s.f + m.forces, 0.);
-    s.input_power = s.field_power = 0;
+    const OperatorsData& known = w.operators;
+    const ScratchData& scratch = w.scratch;
+    std::copy(scratch.held.begin(), scratch.held.end(), s.load);
+    for (int i = 0; i < scratch.moving_count; ++i) {
+        const int k = scratch.moving[static_cast<std::size_t>(i)];
+        if (extent == Extent::all_pairs || contact[k] != locked) s.load[k] = pair_load(w, k, s.at);
+    }
+    for (int k = m.first_external; k < m.forces; ++k) s.f[k] = 0;
+    double input_power = 0, field_power = 0;
     const auto add = [&](int mass, double torque) { s.f[m.external_force[static_cast<std::size_t>(mass)]] += torque; };
     const auto drive = [&](int mass, double torque) {
         add(mass, torque);
-        s.input_power += torque * s.z[mass];
+        input_power += torque * s.z[mass];
     };
 
     const double* auxiliary = s.auxiliary;
     double* rate = s.auxiliary_rate;
     for (std::size_t t = 0; t < m.tyres.size(); ++t, ++auxiliary, ++rate) {
+        const TyreLaw& law = m.tyres[t];
         const BrixiusTyre& tyre = d.tyres[t];
-        const int wheel = m.tyres[t].wheel, body = m.tyres[t].body;
-        *rate = tyre_slip_rate(tyre, *auxiliary, s.z[wheel], s.z[body]);
-        s.tyre_slip[t] = tyre_slip(tyre, *auxiliary, *rate, s.z[wheel], s.z[body]);
-        s.tyre_force[t] = tyre_force(w.operators.soils[t], s.tyre_slip[t]);
-        add(wheel, -s.tyre_force[t] * tyre.radius);
-        add(body, s.tyre_force[t]);
-        s.field_power += s.tyre_force[t] * (s.z[wheel] * tyre.radius - s.z[body]);
+        const double wheel_speed = s.z[law.wheel], body_speed = s.z[law.body];
+        *rate = tyre_slip_rate(tyre, *auxiliary, wheel_speed, body_speed);
+        const double slip = s.tyre_slip[t] = tyre_slip(tyre, *auxiliary, *rate, wheel_speed, body_speed);
+        const double force = s.tyre_force[t] = tyre_force(known.soils[t], slip);
+        add(law.wheel, -force * tyre.radius);
+        add(law.body, force);
+        s.load[law.resistance] += tyre_resistance(known.soils[t], slip);
+        field_power += force * (wheel_speed * tyre.radius - body_speed);
     }
     for (std::size_t e = 0; e < m.engines.size(); ++e, auxiliary += 2, rate += 2) {
+        const EngineLaw& law = m.engines[e];
         const Engine& engine = d.engines[e];
         const EngineState state{auxiliary[0], auxiliary[1]};
-        const EngineInput& in = w.operators.engine_inputs[e];
-        const EngineMode mode = engine_mode(w, e);
-        const int mass = m.engines[e].mass;
-        const double speed = s.z[mass], peak = m.engines[e].peak;
+        const EngineMode mode = scratch.engine_modes[e];
+        const double speed = s.z[law.mass];
         EngineState change;
-        if (mode == EngineMode::running) change = engine_rate(engine, peak, in, state, speed);
+        if (mode == EngineMode::running) change = engine_rate(engine, law.peak, known.engine_inputs[e], state, speed);
         rate[0] = change.torque;
         rate[1] = change.boost;
-        s.engine_torque[e] = engine_torque(engine, peak, in, state, mode, speed);
-        drive(mass, s.engine_torque[e]);
+        s.engine_torque[e] = engine_torque(engine, law.peak, known.engine_inputs[e], state, mode, speed);
+        drive(law.mass, s.engine_torque[e]);
+        s.load[law.pair] = stalled_friction_capacity(engine, mode, speed);
     }
     for (std::size_t c = 0; c < m.converters.size(); ++c) {
         const int pump = m.converters[c].pump, turbine = m.converters[c].turbine;
@@ -162,7 +138,7 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s, Ext
         s.converter[2 * c + 1] = torques.turbine;
         add(pump, -torques.pump);
         add(turbine, torques.turbine);
-        s.field_power += torques.pump * s.z[pump] - torques.turbine * s.z[turbine];
+        field_power += torques.pump * s.z[pump] - torques.turbine * s.z[turbine];
     }
     for (std::size_t i = 0; i < m.sources.size(); ++i) {
         const TorqueSource& source = d.sources[i];
@@ -172,11 +148,15 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s, Ext
         drive(mass, torque);
     }
     for (std::size_t i = 0; i < m.road_mass.size(); ++i) {
-        const Road& road = d.roads[i];
         const int body = m.road_mass[i];
-        drive(body, grade_force(road, input(w, m.grade), d.gravity) + air_force(road, s.z[body]));
+        drive(body, known.grade_forces[i] + air_force(d.roads[i], s.z[body]));
     }
-    pair_forces(w, contact, s, extent);
+    for (std::size_t p = 0; p < m.plough_mass.size(); ++p) {
+        s.load[m.plough_pair[p]] += plough_draft(d.ploughs[p], s.z[m.plough_mass[p]], known.draft);
+    }
+    s.input_power = input_power;
+    s.field_power = field_power;
+    pair_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }
 
@@ -192,10 +172,25 @@ void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIF
 void internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     if (mode.tree) return tree_internal_torques(w, mode, s);
     const ModelData& m = w.model;
-    double* active = w.scratch.vector_c.data();
-    m.kernel.multiply(mode.torques, padded(mode.row_count), m.columns, s.z, nullptr, active);
+    const int rows = mode.row_count + static_cast<int>(m.translating.size());
+    m.kernel.multiply(mode.torques, padded(rows), mode.order + m.forces, read_coordinates(mode, s), nullptr, s.active);
     std::fill(s.torque, s.torque + m.torques, 0.);
-    for (int r = 0; r < mode.row_count; ++r) s.torque[mode.rows[r]] = active[r];
+    for (int r = 0; r < mode.row_count; ++r) s.torque[mode.rows[r]] = s.active[r];
+}
+
+double* read_coordinates(const Mode& mode, const Sample& s) SHIFTRIG_REALTIME {
+    double* q = s.f - mode.order;
+    for (int i = 0; i < mode.order; ++i) q[i] = s.z[mode.coordinates[i]];
+    return q;
+}
+
+void show(const ModelData& m, const Mode& mode, const double* q, Sample& s) SHIFTRIG_REALTIME {
+    m.kernel.multiply(mode.view, padded(m.seen), mode.order, q, nullptr, s.z);
+}
+
+void look(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    if (mode.tree) return tree_slips(m, mode, s);
+    show(m, mode, read_coordinates(mode, s), s);
 }
 
 }  // namespace shiftrig::plant::detail

@@ -28,6 +28,9 @@ void advance_actuation(Work& work) SHIFTRIG_REALTIME;
 // The loads at the present state of the actuators, for a look without a step.
 void hold_actuation(Work& work) SHIFTRIG_REALTIME;
 
+// Of a hydraulic actuator, from the State block [Pa].
+double chamber_pressure(const double* block, const PairLaw& law) SHIFTRIG_REALTIME;
+
 // Load of a pair at an instant: times its friction factor this is its capacity. [Nm]
 double pair_load(const Work& work, int pair, const Instant& at) SHIFTRIG_REALTIME;
 
@@ -49,6 +52,13 @@ void contact_forces(const Work& work, const unsigned char* contact, Sample& samp
 
 // [Algin] eq. (15): M of the active set in `mode` from z and f of the sample.
 void internal_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+
+// The coordinates of the mode, read out of z into their place before f.
+double* read_coordinates(const Mode& mode, const Sample& sample) SHIFTRIG_REALTIME;
+// z and all slips of the sample from coordinates.
+void show(const ModelData& model, const Mode& mode, const double* coordinates, Sample& sample) SHIFTRIG_REALTIME;
+// The same from the sample's own z, which comes to lie on the constraints of the mode.
+void look(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
 // What a pair or a mesh slips at: A_kᵀω.
 inline double slip_of(const std::array<Link, 2>& links, const double* speeds) noexcept {

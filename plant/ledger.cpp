@@ -9,34 +9,20 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-// Loss in tyres, converters and meshes at a sample [W].
-double field_and_mesh_losses(const Work& w, const Mode& mode, const Sample& s) {
-    const ModelData& m = w.model;
-    double power = s.field_power;
-    for (int k = 0; k < m.meshes; ++k) {
-        const auto i = static_cast<std::size_t>(k);
-        const Mesh& mesh = m.structure.meshes[i];
-        const unsigned char state = w.contact[m.pairs + k];
-        if (!mesh.lossy() || state == stuck || mode.bound[m.pairs + k]) continue;
-        // M₁ (ω_1 − û ω_2 − (1 − û) ω_c), of which u in place of û gives nothing.
-        const double turning = slip_fast(m.mesh_loss[i], s.z) / mesh.ratio;
-        power += s.torque[m.pairs + k] * (mesh.ratio - mesh.force_ratio(loss_exponent(state))) * turning;
-        const int bearing = m.bearing_force[i];
-        if (bearing >= 0) power += s.f[bearing] * mesh.ratio * turning;
-    }
+// Loss in meshes and their bearings at a sample [W].
+double mesh_losses(const ModelData& m, const Mode& mode, const Sample& s) {
+    double power = 0;
+    for (int k = 0; k < m.meshes; ++k) power += mode.loss_share[k] * s.torque[m.pairs + k] * s.turning[k];
+    for (int k = m.pairs; k < m.first_external; ++k) power += s.f[k] * s.slip[k];
     return power;
 }
 
 // Loss in dampers and in the damping of shafts [W].
-double damping_losses(const Work& w, const Sample& s) {
-    const ModelData& m = w.model;
+double damping_losses(const ModelData& m, const Sample& s) {
     double power = 0;
-    const auto damped = [&](double damping, const std::array<Link, 2>& links) {
-        const double rate = slip_fast(links, s.z);
-        power += damping * rate * rate;
-    };
-    for (std::size_t e = 0; e < m.shaft_rate.size(); ++e) damped(m.structure.shafts[e].damping, m.shaft_rate[e]);
-    for (std::size_t e = 0; e < m.damper_rate.size(); ++e) damped(m.structure.dampers[e].damping, m.damper_rate[e]);
+    const double* swing = s.swing;
+    for (const Elastic& shaft : m.structure.shafts) power += shaft.damping * *swing * *swing, ++swing;
+    for (const Elastic& damper : m.structure.dampers) power += damper.damping * *swing * *swing, ++swing;
     return power;
 }
 
@@ -49,7 +35,9 @@ double fill_middle(Work& w, const Mode& mode) {
     const double h = end.at.time - begin.at.time;
     double* change = s.vector_b.data();
     for (int k = 0; k < m.forces; ++k) change[k] = s.half.f[k] - begin.f[k];
-    m.kernel.multiply(s.used.middle, m.states_padded, m.forces, change, s.half.z, middle.z);
+    double* q = s.vector_a.data();
+    m.kernel.multiply(s.used.middle, padded(mode.order), m.forces, change, read_coordinates(mode, s.half), q);
+    show(m, mode, q, middle);
     for (int i = 0; i < m.auxiliary; ++i) {
         middle.auxiliary[i] = 0.5 * (begin.auxiliary[i] + end.auxiliary[i]) +
                               h / 8 * (begin.auxiliary_rate[i] - end.auxiliary_rate[i]);
@@ -57,7 +45,7 @@ double fill_middle(Work& w, const Mode& mode) {
     middle.at = s.half.at;
     evaluate_forces(w, w.contact, middle, Extent::moving_pairs);
     internal_torques(w, mode, middle);
-    return h / 6 * (damping_losses(w, begin) + 4 * damping_losses(w, middle) + damping_losses(w, end));
+    return h / 6 * (damping_losses(m, begin) + 4 * damping_losses(m, middle) + damping_losses(m, end));
 }
 
 // The parabola through the forces at start, middle and end with which the step was made, at the fraction s.
@@ -81,39 +69,37 @@ void book_finely(Work& w, const Mode& mode) {
     int parts = mode.ledger_parts;
     if (s.used.length != mode.step.length) {
         parts = ledger_parts(mode, h / w.h);
-        op = place_operators(m, s.ledger_memory.data());
-        build_step_operators(m, mode, h / parts, op, s.workspace.data());
+        op = build_step_operators(m, mode, h / parts, s.ledger_memory.data(), s.workspace.data());
     }
     Sample& at = s.middle;
-    double* forces = s.vector_c.data();     // at start, middle and end of a part
-    double* moved = s.vector_a.data();
+    const int block = padded(mode.order);
+    double* const at_half = s.vector_a.data();  // the three blocks of `advance`, of which the last is the end
+    double* const forces = s.vector_c.data();
     std::copy(s.begin.z, s.begin.z + m.states, at.z);
+    look(m, mode, at);
     double external_work = 0;
     for (int part = 0;; ++part) {
         forces_at(s, m.forces, static_cast<double>(part) / parts, at.f);
         const double weight = h / parts / 3 * (part == 0 || part == parts ? 1 : part % 2 ? 4 : 2);  // Simpson
         internal_torques(w, mode, at);
-        at.field_power = 0;
-        double loss = field_and_mesh_losses(w, mode, at) + damping_losses(w, at);
+        double loss = mesh_losses(m, mode, at) + damping_losses(m, at);
         for (int k = 0; k < m.pairs; ++k) {
-            if (w.contact[k] == locked) continue;
-            const double power = at.f[k] * slip_fast(m.pair_slip[static_cast<std::size_t>(k)], at.z);
+            const double power = at.f[k] * at.slip[k];
             s.heat[static_cast<std::size_t>(k)] += weight * power;
             loss += power;
         }
         s.dissipated += weight * loss;
-        for (int k = m.first_external; k < m.forces; ++k) {
-            external_work -= weight * at.f[k] * slip_fast(m.force_on[static_cast<std::size_t>(k)], at.z);
-        }
+        for (int k = m.first_external; k < m.forces; ++k) external_work -= weight * at.f[k] * at.slip[k];
         for (std::size_t i = 0; i < m.translating.size(); ++i) {
             w.next[m.layout.distances + static_cast<int>(i)] += weight * at.z[m.translating[i]];
         }
         if (part == parts) break;
-        std::copy(at.f, at.f + m.forces, forces);
-        forces_at(s, m.forces, (part + 0.5) / parts, forces + m.forces);
-        forces_at(s, m.forces, (part + 1.) / parts, forces + 2 * m.forces);
-        m.kernel.multiply(op.whole, m.states_padded, m.states, at.z, nullptr, moved);
-        m.kernel.multiply(op.combined, m.states_padded, 3 * m.forces, forces, moved, at.z);
+        m.kernel.multiply(op.from_begin, 3 * block, mode.order + m.forces, read_coordinates(mode, at), nullptr, at_half);
+        forces_at(s, m.forces, (part + 0.5) / parts, forces);
+        m.kernel.multiply(op.from_half, 2 * block, m.forces, forces, at_half + block, at_half + block);
+        forces_at(s, m.forces, (part + 1.) / parts, forces);
+        m.kernel.multiply(op.from_late, block, m.forces, forces, at_half + 2 * block, at_half + 2 * block);
+        show(m, mode, at_half + 2 * block, at);
     }
     // What tyres and converters lose goes through external forces: the rest of these is input.
     const double field = h / 6 * (s.begin.field_power + 4 * s.half.field_power + s.end.field_power);
@@ -143,18 +129,15 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     w.scratch.dissipated += mode.tree ? tree_middle(w, mode) : fill_middle(w, mode);
 
     const auto simpson = [h](double a, double b, double c) { return h / 6 * (a + 4 * b + c); };
+    double heat_of_all = 0;
     for (int k = 0; k < m.pairs; ++k) {
-        if (w.contact[k] == locked) continue;
-        if (begin.f[k] == 0 && middle.f[k] == 0 && end.f[k] == 0) continue;
-        const auto& links = m.pair_slip[static_cast<std::size_t>(k)];
-        const double heat = simpson(begin.f[k] * slip_fast(links, begin.z), middle.f[k] * slip_fast(links, middle.z),
-                                    end.f[k] * slip_fast(links, end.z));
+        const double heat = simpson(begin.f[k] * begin.slip[k], middle.f[k] * middle.slip[k], end.f[k] * end.slip[k]);
         w.scratch.heat[static_cast<std::size_t>(k)] += heat;
-        w.scratch.dissipated += heat;
+        heat_of_all += heat;
     }
-    w.scratch.dissipated +=
-        simpson(field_and_mesh_losses(w, mode, begin), field_and_mesh_losses(w, mode, middle),
-                field_and_mesh_losses(w, mode, end));
+    w.scratch.dissipated += heat_of_all + simpson(begin.field_power + mesh_losses(m, mode, begin),
+                                                  middle.field_power + mesh_losses(m, mode, middle),
+                                                  end.field_power + mesh_losses(m, mode, end));
     w.scratch.input_work += simpson(begin.input_power, middle.input_power, end.input_power);
     for (std::size_t i = 0; i < m.translating.size(); ++i) {
         const int j = m.translating[i];

@@ -62,25 +62,31 @@ int pivoted_basis(double* columns, int count, int n, double* basis) {
     return rank;
 }
 
+// x of a mesh in the mode; a stuck one has no loss.
+int exponent(const ModelData& m, const Mode& mode, int mesh) {
+    const unsigned char key = mode.key[m.pairs + mesh];
+    return key == 0 ? 0 : key == 2 ? -1 : 1;
+}
+
 }  // namespace
+
+void set_loss_shares(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
+    for (int k = 0; k < m.meshes; ++k) {
+        const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
+        mode.loss_share[k] = 1 - mesh.force_ratio(exponent(m, mode, k)) / mesh.ratio;
+    }
+}
 
 ModeSizes::ModeSizes(const ModelData& m) {
     basis = m.masses * m.masses;
     mobility = panel_size(m.masses, m.masses);
+    const int translating = static_cast<int>(m.translating.size());
+    view = panel_size(m.seen, m.states);
     rates = panel_size(m.states, m.columns);
-    torques = panel_size(m.torques, m.columns);
-    operators = panel_size(m.states, m.columns + m.states + 5 * m.forces);  // of one length
+    torques = panel_size(m.torques + translating, m.columns);
+    balance = panel_size(m.torques, m.columns + m.torques);
+    operators = m.states_padded * (3 * m.columns + 4 * m.forces);  // of one length
     key = (m.contact_bytes + 7) / 8 * 8;
-}
-
-StepOperators place_operators(const ModelData& m, double* memory) SHIFTRIG_REALTIME {
-    StepOperators o;
-    o.half = memory;
-    o.whole = o.half + panel_size(m.states, m.columns);
-    o.first = o.whole + panel_size(m.states, m.states);
-    o.combined = o.first + panel_size(m.states, m.forces);
-    o.middle = o.combined + panel_size(m.states, 3 * m.forces);
-    return o;
 }
 
 void mode_key(const ModelData& m, const unsigned char* contact, unsigned char* key) SHIFTRIG_REALTIME {
@@ -100,14 +106,14 @@ int workspace_doubles(const ModelData& m) noexcept {
                      + unknowns * unknowns  // G again
                      + padded(n) * n        // B
                      + 4 * (m.states_padded + m.torques) + m.states_padded * m.columns +
-                     padded(m.torques) * m.columns;
+                     padded(m.torques) * m.columns + coordinates_workspace(m);
     const int exponential = 16 * square + 3 * m.states_padded * (m.columns + 4 * m.forces);
     return std::max(mode, exponential) + 64;
 }
 
-int workspace_integers(const ModelData& m) noexcept { return 2 * m.torques + 8; }
+int workspace_integers(const ModelData& m) noexcept { return m.masses; }
 
-void build_mode(const ModelData& m, Mode& mode, double* workspace, int*) SHIFTRIG_REALTIME {
+void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers) SHIFTRIG_REALTIME {
     const Structure& s = m.structure;
     const int n = m.masses;
     const auto mesh_key = [&](int k) { return mode.key[m.pairs + k]; };
@@ -179,8 +185,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int*) SHIFTRI
             weight = pair.nominal_capacity;
         } else if (unknown < m.pairs + m.meshes) {
             const Mesh& mesh = s.meshes[static_cast<std::size_t>(unknown - m.pairs)];
-            const int x = mesh_key(unknown - m.pairs) == 0 ? 0 : mesh_key(unknown - m.pairs) == 2 ? -1 : 1;
-            length = scaled_column(m, mesh.column(mesh.force_ratio(x)), c);
+            length = scaled_column(m, mesh.column(mesh.force_ratio(exponent(m, mode, unknown - m.pairs))), c);
         } else {
             const Mesh& mesh = s.meshes[static_cast<std::size_t>(unknown - m.pairs - m.meshes)];
             length = scaled_column(
@@ -287,8 +292,8 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int*) SHIFTRI
         apply(m.force_columns[static_cast<std::size_t>(k)]);
         add_to(m.states + k, 1);
     }
-    to_panels(motion, m.states, m.columns, mode.rates);
-    to_panels(torque, rows, m.columns, mode.torques);
+    set_loss_shares(m, mode);
+    build_coordinates(m, mode, motion, torque, reaction + rows, integers);
 }
 
 }  // namespace shiftrig::plant::detail

@@ -94,7 +94,7 @@ PairLaw clutch_law(ModelData& m, const Clutch& c, int& actuator_slots) {
         law.valve_stuck = add_switch(m, prefix + "valve_stuck", "fault: 1 holds the valve's outlet pressure");
         law.leak = add_switch(m, prefix + "leak", "fault: share of the chamber pressure lost");
         law.delay_slots = static_cast<int>(delay_slots(*hydraulic, m.description.oil ? &*m.description.oil : nullptr, h));
-        actuator_slots += 7 + law.delay_slots;
+        actuator_slots += hydraulic_slots + law.delay_slots;
     } else {
         law.source = LoadSource::constant;
     }
@@ -121,6 +121,7 @@ void build_laws(ModelData& m) {
             case PairKind::body_resistance: law.source = LoadSource::resistance; break;
             case PairKind::engine_friction: law.source = LoadSource::engine; break;
         }
+        if (pair.kind != PairKind::clutch) law.friction.base = law.friction.static_factor = 1;
         if (law.heat) law.temperature = 2 * heated++;
         law.sliding_at_rest = sliding_factor(law.friction, 0);
         if (law.source == LoadSource::waveform) m.depends_on_time = true;
@@ -132,7 +133,8 @@ void build_laws(ModelData& m) {
     if (!d.engines.empty()) m.throttle = add_input(m, "driver.throttle", Unit::one, 0, 0, 1, "sets the engine's no-load speed");
     for (const BrixiusTyre& tyre : d.tyres) {
         m.tyres.push_back({s.mass(tyre.wheel), s.mass(tyre.body),
-                           add_input(m, "environment.mobility_number", Unit::one, tyre.mobility_number, 1, 1e4, "Brixius number of the soil")});
+                           add_input(m, "environment.mobility_number", Unit::one, tyre.mobility_number, 1, 1e4, "Brixius number of the soil"),
+                           s.pair(tyre.body + ".resistance")});
     }
     for (const TorqueConverter& c : d.converters) m.converters.push_back({s.mass(c.pump), s.mass(c.turbine)});
     for (const Engine& e : d.engines) {
@@ -241,6 +243,7 @@ void build_sizes(ModelData& m) {
     m.forces = static_cast<int>(m.force_columns.size());
     for (const auto& links : m.force_columns) m.force_on.push_back(branchless(links));
     m.columns = m.states + m.forces;
+    m.seen = m.columns + m.meshes + m.twists + static_cast<int>(s.dampers.size());
 }
 
 // Beyond about 40 speeds and twists a step along the tree is cheaper than dense products.

@@ -40,6 +40,7 @@ struct PairLaw {
 
 struct TyreLaw {
     int wheel = -1, body = -1, mobility = -1;
+    int resistance = -1;  // friction pair of the body
 };
 struct ConverterLaw {
     int pump = -1, turbine = -1;
@@ -75,7 +76,8 @@ struct ModelData {
     int states = 0, states_padded = 0;
     int forces = 0;                       // m
     int first_external = 0;               // where bearing friction ends in f
-    int columns = 0;                      // states + m, what an operator multiplies
+    int columns = 0;                      // states + m, at most what an operator multiplies
+    int seen = 0;                         // what a view shows: z, slips of forces, meshes, shafts, dampers
     int torques = 0;                      // unknowns: pairs, meshes, losses of stuck meshes
     int auxiliary = 0;                    // tyre slips, engine torque and boost
     int contact_bytes = 0;                // pairs + meshes

@@ -1,7 +1,10 @@
 // One contact mode = one linear system, and its operators for a step of any length. Internal to plant/.
 //
 //   ω̇ = B M̃,  B = Π₀ J⁻¹(I − Ĉ T̂),   M_R = T̂ M̃,   M̃ = S f − A_E (K φ + D A_Eᵀ ω)      [Algin] eq. (14), (15)
-//   ż = L z + S̃ f,  M_R = R_z z + R_f f
+//   ż = L q + S̃ f,  M_R = R_q q + R_f f
+//
+// The speeds that the rigid set leaves free, with the twists, are the coordinates q of the mode; z = E q. The
+// state stays z, of one layout in all modes; q is read out of it, and whatever comes from q lies on the constraints.
 //
 // with the active rigid set (locked pairs, meshes, stuck meshes), C its kinematic and Ĉ its force columns.
 // T̂ = G⁺ Qᵀ J^(−1/2), G = Qᵀ J^(−1/2) Ĉ, and Q an orthonormal basis of J^(−1/2) C: dependent rows (tie-up)
@@ -34,24 +37,33 @@ struct Mode {
     int rank = 0;                    // with stuck meshes
     bool redundant = false;          // more unknowns than independent rows: the split is not unique
     double* basis = nullptr;         // Q, masses × rank
+    int order = 0;                   // number of coordinates
+    int* coordinates = nullptr;      // q_i = z[coordinates[i]]
+    double* loss_share = nullptr;    // per mesh: power lost = share·M_1·turning, 1 − û/u; 0 where at rest
+    double* family_mobility = nullptr;    // per mesh: 1/√(reduced inertia) of its motion; negative: not yet asked for
+    signed char* relations = nullptr;     // meshes × contact bytes: which devices at rest turn with it
+    double* view = nullptr;          // E and all slips   panels, seen × order
     double* mobility = nullptr;      // B                 panels, masses × masses
-    double* rates = nullptr;         // [L S̃]             panels, states × columns
-    double* torques = nullptr;       // [R_z R_f]         panels, rows × columns
+    double* rates = nullptr;         // [L S̃]             panels, states × (order + forces)
+    double* torques = nullptr;       // [R_q R_f]         panels, (rows + translating) × (order + forces); the latter
+                                     //                   are accelerations
+    double* balance = nullptr;       // C_Iᵀ J⁻¹ (M̃ − Ĉ M_R), in torques  panels, rows × (order + forces + rows)
     StepOperators step;              // for the model's step size
     int ledger_parts = 1;            // into how many parts the ledger divides a step: stiff shafts swing within it
     StepOperators ledger;            // for one of them
+    double *step_memory = nullptr, *ledger_memory = nullptr;
     TreeMode* tree = nullptr;        // instead of all matrices, on the engine for long chains
 };
 
 // Room that a mode and its operators take, in doubles and ints.
 struct ModeSizes {
-    int basis = 0, mobility = 0, rates = 0, torques = 0, operators = 0;
+    int basis = 0, view = 0, mobility = 0, rates = 0, torques = 0, balance = 0, operators = 0;
     int key = 0;  // bytes, a multiple of 8
     explicit ModeSizes(const ModelData& model);
-    int doubles() const noexcept { return basis + mobility + rates + torques + 2 * operators; }
+    int doubles() const noexcept {
+        return basis + view + mobility + rates + torques + balance + 2 * operators;
+    }
 };
-
-StepOperators place_operators(const ModelData& model, double* memory) SHIFTRIG_REALTIME;
 
 // Doubles and ints of working memory that build_mode and build_step_operators need.
 int workspace_doubles(const ModelData& model) noexcept;
@@ -59,12 +71,20 @@ int workspace_integers(const ModelData& model) noexcept;
 
 void mode_key(const ModelData& model, const unsigned char* contact, unsigned char* key) SHIFTRIG_REALTIME;
 
+// Coordinates, view, and the operators that multiply them, from [L S̃] and [R_z R_f] over [z; f] (column-major).
+void build_coordinates(const ModelData& model, Mode& mode, const double* motion, const double* torque,
+                       double* workspace, int* integers) SHIFTRIG_REALTIME;
+int coordinates_workspace(const ModelData& model) noexcept;
+
+// Mode::loss_share from its key and bound bits.
+void set_loss_shares(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
+
 // Everything of a mode but its step operators. `mode.key` is set by the caller.
 void build_mode(const ModelData& model, Mode& mode, double* workspace, int* integers) SHIFTRIG_REALTIME;
 
-// The operators of one step of `length` in the mode. Returns how often the length was halved to make h L small.
-int build_step_operators(const ModelData& model, const Mode& mode, double length, StepOperators& operators,
-                          double* workspace) SHIFTRIG_REALTIME;
+// The operators of one step of `length` in the mode, in `memory` of ModeSizes::operators doubles.
+StepOperators build_step_operators(const ModelData& model, const Mode& mode, double length, double* memory,
+                                   double* workspace) SHIFTRIG_REALTIME;
 
 // The cache: a table of bounded size, least recently used goes.
 struct OperatorsData {
@@ -72,6 +92,8 @@ struct OperatorsData {
     std::vector<double> memory;
     std::vector<unsigned char> bytes, keys;
     std::vector<int> integers, row_memory;
+    std::vector<double> share_memory;
+    std::vector<signed char> relation_memory;
     std::vector<Mode> modes;
     std::vector<TreeMode> trees;  // one per mode where the model has a tree
     std::vector<TreeMass> tree_masses;
@@ -82,6 +104,8 @@ struct OperatorsData {
     std::vector<double> raw_input, input;
     std::vector<TyreSoil> soils;
     std::vector<EngineInput> engine_inputs;
+    std::vector<double> grade_forces;  // per road [N]
+    double draft = 1;                  // share of the plough in the ground
     bool inputs_known = false;
     // The samples a step begins and ends with. The end of one is the beginning of the next: carried over where
     // State and inputs prove to be those it was computed from.

@@ -2,6 +2,7 @@
 // contact states, so forgetting one costs time, never bits.
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "plant/modes.h"
 
@@ -21,19 +22,28 @@ OperatorsData::OperatorsData(const ModelData& m) {
         place_matrices(m);
     }
     const auto key_bytes = static_cast<std::size_t>(padded(m.contact_bytes));
-    const auto rows = static_cast<std::size_t>(m.torques);
+    const auto rows = static_cast<std::size_t>(m.torques), states = static_cast<std::size_t>(m.states);
+    const auto meshes = static_cast<std::size_t>(m.meshes);
     keys.assign(modes.size() * 2 * key_bytes, 0);
-    row_memory.assign(modes.size() * rows, 0);
+    row_memory.assign(modes.size() * (rows + states), 0);
+    const std::size_t relations = meshes * static_cast<std::size_t>(m.tree ? 0 : m.contact_bytes);
+    share_memory.assign(modes.size() * 2 * meshes, 0.);
+    relation_memory.assign(modes.size() * relations, 0);
     for (std::size_t i = 0; i < modes.size(); ++i) {
         modes[i].key = keys.data() + i * 2 * key_bytes;
         modes[i].bound = modes[i].key + key_bytes;
-        modes[i].rows = row_memory.data() + i * rows;
+        modes[i].rows = row_memory.data() + i * (rows + states);
+        modes[i].coordinates = modes[i].rows + rows;
+        modes[i].loss_share = share_memory.data() + i * 2 * meshes;
+        modes[i].family_mobility = modes[i].loss_share + meshes;
+        modes[i].relations = relation_memory.data() + i * relations;
     }
     wanted.assign(key_bytes, 0);
     raw_input.assign(m.inputs.size(), 0.);
     input.assign(m.inputs.size(), 0.);
     soils.resize(m.tyres.size());
     engine_inputs.resize(m.engines.size());
+    grade_forces.assign(m.road_mass.size(), 0.);
     sample_memory.assign(2 * sample_size(m), 0.);
     for (std::size_t i = 0; i < 2; ++i) place_sample(m, samples[i], sample_memory.data() + i * sample_size(m));
     carried_contact.assign(static_cast<std::size_t>(m.contact_bytes), 0);
@@ -49,13 +59,15 @@ void OperatorsData::place_matrices(const ModelData& m) {
     memory.assign(modes.size() * per_mode, 0.);
     double* at = memory.data();
     for (Mode& mode : modes) {
-        mode.basis = at;
-        mode.mobility = mode.basis + sizes.basis;
-        mode.rates = mode.mobility + sizes.mobility;
-        mode.torques = mode.rates + sizes.rates;
-        mode.step = place_operators(m, mode.torques + sizes.torques);
-        mode.ledger = place_operators(m, mode.torques + sizes.torques + sizes.operators);
-        at += per_mode;
+        const auto take = [&at](int doubles) { return std::exchange(at, at + doubles); };
+        mode.basis = take(sizes.basis);
+        mode.view = take(sizes.view);
+        mode.mobility = take(sizes.mobility);
+        mode.rates = take(sizes.rates);
+        mode.torques = take(sizes.torques);
+        mode.balance = take(sizes.balance);
+        mode.step_memory = take(sizes.operators);
+        mode.ledger_memory = take(sizes.operators);
     }
 }
 
@@ -97,13 +109,17 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
     std::memcpy(oldest->key, o.wanted.data(), bytes);
     if (m.tree) {
         build_tree_mode(m, *oldest);
+        set_loss_shares(m, *oldest);
     } else {
         build_mode(m, *oldest, scratch.workspace.data(), scratch.workspace_index.data());
+        std::fill(oldest->family_mobility, oldest->family_mobility + m.meshes, -1.);
         const double h = m.options.step_size;
-        const int halvings = build_step_operators(m, *oldest, h, oldest->step, scratch.workspace.data());
-        oldest->ledger_parts = halvings == 0 ? 1 : 4 << std::min(halvings, 6);
-        if (halvings > 0) {
-            build_step_operators(m, *oldest, h / oldest->ledger_parts, oldest->ledger, scratch.workspace.data());
+        oldest->step = build_step_operators(m, *oldest, h, oldest->step_memory, scratch.workspace.data());
+        const int halvings = oldest->step.halvings;
+        oldest->ledger_parts = halvings <= 1 ? 1 : 4 << std::min(halvings, 6);
+        if (oldest->ledger_parts > 1) {
+            oldest->ledger = build_step_operators(m, *oldest, h / oldest->ledger_parts, oldest->ledger_memory,
+                                                  scratch.workspace.data());
         }
     }
     oldest->last_use = ++o.clock;

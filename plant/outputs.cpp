@@ -7,18 +7,12 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-double acceleration(Work& w, const Mode& mode, const Sample& s, int mass) {
-    const ModelData& m = w.model;
-    if (mode.tree) {
-        Sample rates = s;
-        sample_rate(w, mode, rates);
-        return rates.rate[mass];
-    }
-    const double* row = mode.rates + panel_index(m.states_padded, m.columns, mass, 0);
-    const int stride = panel_index(m.states_padded, m.columns, mass, 1) - panel_index(m.states_padded, m.columns, mass, 0);
-    double sum = 0;
-    for (int c = 0; c < m.columns; ++c, row += stride) sum += *row * s.z[c];
-    return sum;
+// Of a translating mass: those stand behind the torques of the mode's rows.
+double acceleration(Work& w, const Mode& mode, const Sample& s, std::size_t translating) {
+    if (!mode.tree) return s.active[static_cast<std::size_t>(mode.row_count) + translating];
+    Sample rates = s;
+    sample_rate(w, mode, rates);
+    return rates.rate[w.model.translating[translating]];
 }
 
 }  // namespace
@@ -48,10 +42,7 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
             put(s.f[k], slip, s.sliding[k], state == free_running ? 2. : 1., s.f[k] * slip);
         }
         put(block[m.layout.heat + k]);
-        if (law.hydraulic) {
-            const PairLoad& load = w.scratch.loads[i];
-            put(load.hydraulic.chamber(s.at.fraction) * load.scale);
-        }
+        if (law.hydraulic) put(chamber_pressure(block, law) * w.scratch.loads[i].scale);
         if (law.heat) put(block[law.temperature]);
     }
     for (int k = 0; k < m.meshes; ++k) {
@@ -78,7 +69,7 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
         put(s.engine_torque[e], full > 0 ? s.engine_torque[e] / full : 0., engine_mode == EngineMode::stalled ? 1. : 0.);
     }
     for (std::size_t i = 0; i < m.translating.size(); ++i) {
-        put(acceleration(w, mode, s, m.translating[i]), block[m.layout.distances + static_cast<int>(i)]);
+        put(acceleration(w, mode, s, i), block[m.layout.distances + static_cast<int>(i)]);
     }
     for (std::size_t p = 0; p < m.plough_mass.size(); ++p) {
         // Its share of what resists the body.

@@ -29,7 +29,7 @@ bool is_coarse(const Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         wrong = std::max(wrong, std::fabs(end.f[k] - late.f[k]));
     }
     if (wrong > force_tolerance * size) return true;
-    if (mode.ledger_parts == 1) return false;
+    if (mode.step.halvings == 0) return false;
     // Twists half way, exact and by the cubic through both ends: what lies between does not show at the ends.
     const double h = end.at.time - begin.at.time;
     double hidden = 0;

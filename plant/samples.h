@@ -21,9 +21,15 @@ struct Instant {
 
 struct Sample {
     Instant at;
-    double* z = nullptr;         // [ω; φ], followed without a gap by
-    double* f = nullptr;         // forces, in one with z for an operator to multiply; products that give z come
-                                 // before f is filled, since their padding reaches into it
+    // What the mode's view shows of the coordinates q: one product fills these four, without a gap.
+    double* z = nullptr;         // [ω; φ]
+    double* slip = nullptr;      // per force: slip of pairs, of bearings in meshes, −ω of external torques
+    double* turning = nullptr;   // per mesh: what its loss torque acts on (ModelData::mesh_loss)
+    double* swing = nullptr;     // twist rate of each shaft, slip of each damper
+    // What operators multiply: q ends where f begins (`coordinates`), f is followed by the torques of the mode's
+    // active rows. A product that gives q comes before f is filled, since its padding reaches into it.
+    double* f = nullptr;         // forces
+    double* active = nullptr;    // torques in the order of Mode::rows, then accelerations of translating masses
     double* auxiliary = nullptr;
     double* auxiliary_rate = nullptr;
     double* load = nullptr;      // per pair: what presses it together [Nm]
@@ -45,22 +51,23 @@ struct PairLoad {
     HydraulicStep hydraulic;
     double scale = 1;         // leak: share of the chamber pressure that is left
     bool fixed = false;       // stuck: `values` is the load
-    bool moves = true;        // changes within the step; otherwise it is `held` all the time
-    double held = 0;          // [Nm]
+    bool moves = true;        // changes within the step; otherwise it is ScratchData::held all the time
 };
 
 // Doubles of one sample, and its place in memory.
 std::size_t sample_size(const ModelData& model);
 void place_sample(const ModelData& model, Sample& sample, double* memory);
 
-// Operators of one step over one length of time, in panels (step_operators.cpp).
+// Operators of one step over one length of time, in panels (step_operators.cpp): what the coordinates and forces
+// at its start, middle and end give to the coordinates half way, at the late stage and at the end. A block is
+// padded(order) rows.
 struct StepOperators {
-    double length = 0;           // [s]
-    double* half = nullptr;      // [P_h Q_h]            states × columns
-    double* whole = nullptr;     // P                    states × states
-    double* first = nullptr;     // Q_1                  states × forces
-    double* combined = nullptr;  // Q1−3Q2+4Q3, 4Q2−8Q3, 4Q3−Q2   states × 3 forces
-    double* middle = nullptr;    // (h/2) φ_2(hL/2) S̃   states × forces
+    double length = 0;             // [s]
+    int halvings = 0;              // of the length, until h L was small
+    double* from_begin = nullptr;  // [P_h Q_h; P −Q_1; P Q_1−3Q_2+4Q_3]   three blocks × (order + forces)
+    double* from_half = nullptr;   // [2Q_1; 4Q_2−8Q_3]                    two blocks × forces
+    double* from_late = nullptr;   // 4Q_3−Q_2                             one block × forces
+    double* middle = nullptr;      // (h/2) φ_2(hL/2) S̃                   one block × forces
 };
 
 struct Mode;
@@ -71,9 +78,14 @@ struct ScratchData {
     Sample begin, end;           // live with the operators
     Sample half, late, middle;
     std::vector<PairLoad> loads;
+    std::vector<double> held;        // per pair: its load where that does not change within the step [Nm]
+    std::vector<int> moving;         // the pairs whose load does
+    std::vector<unsigned char> quiet;  // the pairs whose valve and piston rest with the command
+    int moving_count = 0;
+    std::vector<EngineMode> engine_modes;  // at the beginning of the step
     std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
     std::vector<signed char> family;
-    std::vector<double> vector_a, vector_b, vector_c;  // padded masses, states, torques or 3 × forces
+    std::vector<double> vector_a, vector_b, vector_c;  // padded masses, torques, forces, or three blocks
     std::vector<double> torque_copy;
     std::vector<double> heat;        // per pair in this step [J]
     double dissipated = 0, input_work = 0;  // in this step [J]
@@ -86,6 +98,7 @@ struct ScratchData {
     bool turned = false;                 // power turned round in some mesh within the last part
     double torque_residual = 0;          // of the tree's internal torques at `end`
     StepOperators used;              // by the last advance
+    bool carries = false;            // `begin` is as the last advance left it, untouched by a change of state
 };
 
 }  // namespace shiftrig::plant::detail

@@ -78,10 +78,10 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
                 }
                 HydraulicState state = hydraulic_rest(
                     *law.hydraulic, law.friction.return_pressure, command,
-                    std::span<double>(block + law.actuator + 7, static_cast<std::size_t>(law.delay_slots)));
-                const double values[7] = {play,        state.head,       state.slewed, state.valve,
-                                          state.valve_rate, state.piston, state.chamber};
-                std::copy(values, values + 7, block + law.actuator);
+                    std::span<double>(block + law.actuator + detail::hydraulic_slots,
+                                      static_cast<std::size_t>(law.delay_slots)));
+                state.play = play;
+                detail::write_hydraulic(block + law.actuator, state);
                 break;
             }
             default: break;

@@ -18,6 +18,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "plant/laws/hydraulics.h"
+
 namespace shiftrig::plant::detail {
 
 struct StateLayout {
@@ -32,5 +34,15 @@ inline std::int64_t read_integer(const double* slot) noexcept {
     return value;
 }
 inline void write_integer(double* slot, std::int64_t value) noexcept { std::memcpy(slot, &value, sizeof value); }
+
+// A hydraulic actuator: its state, then the delay line.
+constexpr int hydraulic_slots = 8;
+inline HydraulicState read_hydraulic(const double* at) noexcept {
+    return {at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7]};
+}
+inline void write_hydraulic(double* at, const HydraulicState& s) noexcept {
+    const double values[hydraulic_slots] = {s.play, s.head, s.slewed, s.valve, s.valve_rate, s.piston, s.chamber, s.steady};
+    for (int i = 0; i < hydraulic_slots; ++i) at[i] = values[i];
+}
 
 }  // namespace shiftrig::plant::detail

@@ -23,12 +23,18 @@ double next_split(const Work& w, double from) SHIFTRIG_REALTIME {
     const auto consider = [&](double fraction) {
         if (fraction > from + 1e-9 && fraction < split - 1e-9) split = fraction;
     };
-    for (const PairLoad& load : w.scratch.loads) consider(load.hydraulic.filled_from);
+    const ScratchData& scratch = w.scratch;
+    for (int i = 0; i < scratch.moving_count; ++i) {
+        const int pair = scratch.moving[static_cast<std::size_t>(i)];
+        consider(scratch.loads[static_cast<std::size_t>(pair)].hydraulic.filled_from);
+    }
     const std::vector<double>& times = w.model.breakpoints;
     const auto first = std::upper_bound(times.begin(), times.end(), w.start + from * w.h);
     for (auto time = first; time != times.end() && *time < w.start + w.h; ++time)
         consider((*time - w.start) / w.h);
-    for (int k = 0; k < w.model.pairs; ++k) consider(load_edge(w, k, from, split));
+    for (int i = 0; i < scratch.moving_count; ++i) {
+        consider(load_edge(w, scratch.moving[static_cast<std::size_t>(i)], from, split));
+    }
     return split;
 }
 
@@ -118,6 +124,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
             mode = &correct_directions(w, *mode);
             accept(w);
             done = reached;
+            s.carries = true;
         }
 
         // The new state acts from here on; where events are used up, or by choice, from the next step on.
@@ -128,7 +135,10 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
             change_all(w, *mode, s.begin);
             outputs.certificate.fall_backs += localise;
         }
-        if (done < 1 || first.device >= 0) mode = &settle(w, s.begin);
+        if (done < 1 || first.device >= 0) {
+            mode = &settle(w, s.begin);
+            s.carries = false;
+        }
     }
     finish_step(w, *mode);
 }

@@ -3,8 +3,9 @@
 //   P = e^(hL),  Q_k = h φ_k(hL) S̃,  φ_0 = e^Z,  φ_(k+1) = (φ_k − I/k!)/Z
 //
 // by scaling and squaring: Z = (h/2) L / 2^s small, φ_3 by its Taylor series, the others from it, then
-// s doublings to h/2 (P_h, Q_h) and one more to h. Computed in energy variables Σz, Σ = diag(√J, √k), in
-// which ‖hL‖ is about h ω_max: stiff shafts on light masses would otherwise cost needless doublings.
+// s doublings to h/2 (P_h, Q_h) and one more to h. All in the coordinates q of the mode, scaled with the roots of
+// their energies (reduced inertia, stiffness), so that ‖hL‖ is about h ω_max: stiff shafts on light masses would
+// otherwise cost needless doublings.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -49,10 +50,16 @@ double norm1(const double* a, int n, int stride) {
 
 }  // namespace
 
-int build_step_operators(const ModelData& m, const Mode& mode, double length, StepOperators& operators,
-                          double* workspace) SHIFTRIG_REALTIME {
+StepOperators build_step_operators(const ModelData& m, const Mode& mode, double length, double* memory,
+                                   double* workspace) SHIFTRIG_REALTIME {
+    const int n = mode.order, stride = padded(n), size = stride * n, columns = n + m.forces;
+    StepOperators operators;
     operators.length = length;
-    const int n = m.states, stride = m.states_padded, size = stride * n;
+    operators.from_begin = memory;
+    operators.from_half = operators.from_begin + 3 * stride * columns;
+    operators.from_late = operators.from_half + 2 * stride * m.forces;
+    operators.middle = operators.from_late + stride * m.forces;
+
     double* next = workspace;
     const auto take = [&](int doubles) { return std::exchange(next, next + doubles); };
     const Algebra algebra{m.kernel, n, stride, take(stride * stride)};
@@ -63,18 +70,21 @@ int build_step_operators(const ModelData& m, const Mode& mode, double length, St
     double* phi = take(4 * size);  // φ_0, φ_1, φ_2, φ_3 side by side
     double* product = take(4 * size + stride * m.forces);
     double *phi0 = phi, *phi1 = phi + size, *phi2 = phi + 2 * size, *phi3 = phi + 3 * size;
-    double* sigma = take(stride);
-    double* column = take(stride);
+    double* sigma = take(2 * stride);
     double* force = take(stride * m.forces);  // Σ S̃
 
     // L and S̃ in energy variables.
-    for (int j = 0; j < n; ++j) {
-        sigma[j] = j < m.masses
-                       ? m.root_inertia[static_cast<std::size_t>(j)]
-                       : std::sqrt(m.structure.shafts[static_cast<std::size_t>(j - m.masses)].stiffness);
+    for (int i = 0; i < n; ++i) {
+        double energy = 0;
+        for (int j = 0; j < m.masses; ++j) {
+            const double ratio = mode.view[panel_index(padded(m.seen), n, j, i)];
+            energy += m.structure.inertia[static_cast<std::size_t>(j)] * ratio * ratio;
+        }
+        const int twist = mode.coordinates[i] - m.masses;
+        sigma[i] = std::sqrt(twist < 0 ? energy : m.structure.shafts[static_cast<std::size_t>(twist)].stiffness);
     }
     const auto rate = [&](int i, int c) {  // [L S̃](i, c)
-        return mode.rates[panel_index(stride, m.columns, i, c)];
+        return mode.rates[panel_index(m.states_padded, columns, mode.coordinates[i], c)];
     };
     std::fill(z, z + size, 0.);
     std::fill(force, force + stride * m.forces, 0.);
@@ -84,9 +94,8 @@ int build_step_operators(const ModelData& m, const Mode& mode, double length, St
     for (int k = 0; k < m.forces; ++k) {
         for (int i = 0; i < n; ++i) force[k * stride + i] = rate(i, n + k) * sigma[i];
     }
-    int doublings = 0;
     double scale = 1;
-    for (double norm = norm1(z, n, stride); norm * scale > 0.5 && doublings < 60; ++doublings) scale *= 0.5;
+    for (double norm = norm1(z, n, stride); norm * scale > 0.5 && operators.halvings < 60; ++operators.halvings) scale *= 0.5;
     for (int i = 0; i < size; ++i) z[i] *= scale;
 
     // φ_3 = Σ Z^k/(k + 3)! in three groups of four powers.
@@ -125,59 +134,47 @@ int build_step_operators(const ModelData& m, const Mode& mode, double length, St
             phi0[i] = product[i];
         }
     };
-    // Writes one column of an operator back in physical variables, accelerations projected once by Π₀ so
-    // that a step lands on the constraints.
-    const auto put = [&](double* panels, int columns, int c, const double* scaled) {
-        std::copy(scaled, scaled + n, column);
-        for (int k = 0; k < mode.rank; ++k) {
-            const double* q = mode.basis + k * m.masses;
-            add_scaled(column, -dot(q, column, m.masses), q, m.masses);
-        }
+    // Writes one column of a block back in physical variables.
+    const auto put = [&](double* panels, int blocks, int block, int width, int c, const double* scaled, double factor) {
         for (int i = 0; i < stride; ++i) {
-            panels[panel_index(stride, columns, i, c)] = i < n ? column[i] / sigma[i] : 0;
+            panels[panel_index(blocks * stride, width, block * stride + i, c)] = i < n ? factor * scaled[i] / sigma[i] : 0;
         }
     };
-    const auto put_transition = [&](double* panels, int columns) {
-        for (int j = 0; j < n; ++j) {
-            for (int i = 0; i < n; ++i) product[i] = phi0[j * stride + i] * sigma[j];
-            put(panels, columns, j, product);
-        }
+    const auto put_transition = [&](int block) {
+        for (int j = 0; j < n; ++j) put(operators.from_begin, 3, block, columns, j, phi0 + j * stride, sigma[j]);
     };
 
-    for (int k = 0; k < doublings; ++k) double_step();
-    put_transition(operators.half, m.columns);
-    algebra.multiply(phi1, force, m.forces, product + size);
+    for (int k = 0; k < operators.halvings; ++k) double_step();
+    put_transition(0);
+    algebra.multiply(phi1, force, m.forces, product);
     for (int k = 0; k < m.forces; ++k) {
-        for (int i = 0; i < n; ++i) product[i] = 0.5 * length * product[size + k * stride + i];
-        put(operators.half, m.columns, n + k, product);
+        put(operators.from_begin, 3, 0, columns, n + k, product + k * stride, 0.5 * length);
     }
-    algebra.multiply(phi2, force, m.forces, product + size);
-    for (int k = 0; k < m.forces; ++k) {
-        for (int i = 0; i < n; ++i) product[i] = 0.5 * length * product[size + k * stride + i];
-        put(operators.middle, m.forces, k, product);
-    }
+    algebra.multiply(phi2, force, m.forces, product);
+    for (int k = 0; k < m.forces; ++k) put(operators.middle, 1, 0, m.forces, k, product + k * stride, 0.5 * length);
 
     double_step();
-    put_transition(operators.whole, n);
-    double* q1 = z;  // the powers have done their work; each holds `forces` columns if they fit
+    put_transition(1);
+    put_transition(2);
+    double* q1 = take(stride * m.forces);
     double* q2 = take(stride * m.forces);
     double* q3 = take(stride * m.forces);
-    if (m.forces > n) q1 = take(stride * m.forces);
+    double* sum = sigma + stride;
     algebra.multiply(phi1, force, m.forces, q1);
     algebra.multiply(phi2, force, m.forces, q2);
     algebra.multiply(phi3, force, m.forces, q3);
     for (int k = 0; k < m.forces; ++k) {
         const double *a = q1 + k * stride, *b = q2 + k * stride, *c = q3 + k * stride;
-        for (int i = 0; i < n; ++i) product[i] = length * a[i];
-        put(operators.first, m.forces, k, product);
-        for (int i = 0; i < n; ++i) product[i] = length * (a[i] - 3 * b[i] + 4 * c[i]);
-        put(operators.combined, 3 * m.forces, k, product);
-        for (int i = 0; i < n; ++i) product[i] = length * (4 * b[i] - 8 * c[i]);
-        put(operators.combined, 3 * m.forces, m.forces + k, product);
-        for (int i = 0; i < n; ++i) product[i] = length * (4 * c[i] - b[i]);
-        put(operators.combined, 3 * m.forces, 2 * m.forces + k, product);
+        put(operators.from_begin, 3, 1, columns, n + k, a, -length);
+        put(operators.from_half, 2, 0, m.forces, k, a, 2 * length);
+        for (int i = 0; i < n; ++i) sum[i] = a[i] - 3 * b[i] + 4 * c[i];
+        put(operators.from_begin, 3, 2, columns, n + k, sum, length);
+        for (int i = 0; i < n; ++i) sum[i] = 4 * b[i] - 8 * c[i];
+        put(operators.from_half, 2, 1, m.forces, k, sum, length);
+        for (int i = 0; i < n; ++i) sum[i] = 4 * c[i] - b[i];
+        put(operators.from_late, 1, 0, m.forces, k, sum, length);
     }
-    return doublings;
+    return operators;
 }
 
 }  // namespace shiftrig::plant::detail

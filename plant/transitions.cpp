@@ -224,29 +224,36 @@ double reduced_motion(const Work& w, const Mode& mode, const Links& links, doubl
     return rest < 1e-9 * length ? 0 : rest;
 }
 
+// How every device would turn with mesh `leader`: ±1, or 0. Geometry of the mode alone, so it is found once.
+void relate(Work& w, const Mode& mode, int leader, signed char* relation) {
+    const ModelData& m = w.model;
+    double* lead = w.scratch.vector_a.data();
+    double* member = w.scratch.vector_b.data();
+    const double mobility = mode.family_mobility[leader] = reduced_motion(w, mode, mesh_of(w, leader).motion(), lead);
+    const auto related = [&](const std::array<Link, 2>& links) -> signed char {
+        const double size = mobility > 0 ? reduced_motion(w, mode, links, member) : 0;
+        if (size == 0) return 0;
+        const double cosine = dot(lead, member, m.masses) / (mobility * size);
+        return static_cast<signed char>(std::fabs(cosine) < 1 - 1e-9 ? 0 : cosine < 0 ? -1 : 1);
+    };
+    for (int k = 0; k < m.pairs; ++k) relation[k] = mode.bound[k] ? related(pair_links(w, k)) : static_cast<signed char>(0);
+    for (int k = 0; k < m.meshes; ++k) {
+        relation[m.pairs + k] = mesh_of(w, k).lossy() ? related(mesh_of(w, k).motion()) : static_cast<signed char>(0);
+    }
+}
+
 // Everything at rest that moves if mesh `leader` moves is one family: part = ±1 turning with or against the
 // leader, 0 others. Returns 1/√(reduced inertia) of its motion, 0 if others hold it.
 double find_family(Work& w, const Mode& mode, int leader, signed char* part) {
     if (mode.tree) return tree_family(w, mode, leader, part);
     const ModelData& m = w.model;
-    double* lead = w.scratch.vector_a.data();
-    double* member = w.scratch.vector_b.data();
-    const double mobility = reduced_motion(w, mode, mesh_of(w, leader).motion(), lead);
-    if (mobility == 0) return 0;
-    const auto relation = [&](const std::array<Link, 2>& links) -> signed char {
-        const double size = reduced_motion(w, mode, links, member);
-        if (size == 0) return 0;
-        const double cosine = dot(lead, member, m.masses) / (mobility * size);
-        return static_cast<signed char>(std::fabs(cosine) < 1 - 1e-9 ? 0 : cosine < 0 ? -1 : 1);
-    };
-    for (int k = 0; k < m.pairs; ++k) {
-        part[k] = slips(w.contact[k]) && mode.bound[k] ? relation(pair_links(w, k)) : static_cast<signed char>(0);
+    signed char* relation = mode.relations + leader * m.contact_bytes;
+    if (mode.family_mobility[leader] < 0) relate(w, mode, leader, relation);
+    for (int k = 0; k < m.contact_bytes; ++k) {
+        const bool still = k < m.pairs ? slips(w.contact[k]) : w.contact[k] == stuck || mode.bound[k];
+        part[k] = still ? relation[k] : static_cast<signed char>(0);
     }
-    for (int k = 0; k < m.meshes; ++k) {
-        const bool candidate = mesh_of(w, k).lossy() && (w.contact[m.pairs + k] == stuck || mode.bound[m.pairs + k]);
-        part[m.pairs + k] = candidate ? relation(mesh_of(w, k).motion()) : static_cast<signed char>(0);
-    }
-    return mobility;
+    return mode.family_mobility[leader];
 }
 
 // Acceleration of a mesh, at rest until now, in the sense in which the sample's contact states take it to move.
@@ -312,7 +319,7 @@ double release_drive(Work& w, const Mode& mode, int leader, Sample& s) {
     }
     std::copy(sliding, sliding + m.pairs, s.sliding);
     contact_forces(w, w.contact, s);
-    std::copy(scratch.torque_copy.begin(), scratch.torque_copy.end(), s.torque);
+    internal_torques(w, mode, s);
     return std::max(best, -1e10 * threshold);  // held whatever is tried: finite, for the search of an instant
 }
 
@@ -407,7 +414,7 @@ void log_event(Work& w, EventKind kind, int device, double time, double torque, 
 void sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     if (mode.tree) return tree_sample_rate(w, mode, s);
     const ModelData& m = w.model;
-    m.kernel.multiply(mode.rates, m.states_padded, m.columns, s.z, nullptr, s.rate);
+    m.kernel.multiply(mode.rates, m.states_padded, mode.order + m.forces, read_coordinates(mode, s), nullptr, s.rate);
 }
 
 double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
@@ -469,13 +476,17 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
         end.z[m.masses + e] += longest / 3 * slip_of(m.structure.shafts[static_cast<std::size_t>(e)].links, change);
     }
     w.scratch.dissipated += before - stored_energy(m, end.z);
+    look(m, turned, end);
     evaluate_forces(w, w.contact, end);
     internal_torques(w, turned, end);
     return turned;
 }
 
 Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
-    if (!complete) evaluate_forces(w, w.contact, s);
+    if (!complete) {
+        look(w.model, find_mode(w.model, w.operators, w.contact, w.scratch), s);
+        evaluate_forces(w, w.contact, s);
+    }
     if (engage_and_release(w, s)) complete = false;
     for (int passes = 0;; ++passes, complete = false) {
         Mode& mode = find_directions(w, w.contact, s, complete);
@@ -545,7 +556,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
     }
     w.scratch.turned = false;
     double size = 0;
-    const double small = mode.ledger_parts == 1 ? small_loss : small_loss_of_swings;
+    const double small = mode.step.halvings == 0 ? small_loss : small_loss_of_swings;
     for (int k = m.pairs; k < m.contact_bytes; ++k) {
         if (w.contact[k] == stuck || mode.bound[k] || !mesh_of(w, k - m.pairs).lossy()) continue;
         const double g1 = turning_margin(w, k, end);

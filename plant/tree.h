@@ -174,6 +174,8 @@ double rigid_torques(const Work& work, const Mode& mode, const GroupState& group
 // ---- the tree's versions of what the dense modes do with matrices (forces.h, transitions.h) ---------------
 
 void tree_internal_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+// Slips of forces and meshes from z.
+void tree_slips(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 void tree_sample_rate(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 // ω̇ of impulses: change = B impulse.
 void tree_mobility(const Work& work, const Mode& mode, const double* impulse,

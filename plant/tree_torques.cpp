@@ -156,7 +156,18 @@ void tree_internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_
     group_forces(*mode.tree, s.f, groups.force);
     const double residual = rigid_torques(w, mode, groups, s);
     if (&s == &scratch.begin) scratch.begin_groups = &mode;
-    if (&s == &scratch.end) scratch.torque_residual = residual;
+    if (&s == &scratch.begin || &s == &scratch.end) scratch.torque_residual = residual;
+}
+
+void tree_slips(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    // Not of what is locked or loses nothing: speeds of masses that nobody asks for are not there at every instant.
+    for (int k = 0; k < m.forces; ++k) {
+        const bool held = k < m.pairs && mode.key[k];
+        s.slip[k] = held ? 0 : slip_fast(m.force_on[static_cast<std::size_t>(k)], s.z);
+    }
+    for (int k = 0; k < m.meshes; ++k) {
+        s.turning[k] = mode.loss_share[k] == 0 ? 0 : slip_fast(m.mesh_loss[static_cast<std::size_t>(k)], s.z);
+    }
 }
 
 void tree_sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {

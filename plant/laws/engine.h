@@ -24,6 +24,7 @@
 // Does not model: cylinder-by-cylinder torque, smoke limit beyond φ, engine brake, temperature.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -70,7 +71,7 @@ inline double torque_demand(const Engine& p, double peak, const EngineInput& inp
     if (input.fuel_cut) return -friction;
     const double share =
         p.turbo_lag > 0 ? p.turbo_instant_fraction + (1 - p.turbo_instant_fraction) * boost : 1;
-    const double upper = std::fmin(full * share, input.torque_limit * peak);
+    const double upper = std::min(full * share, input.torque_limit * peak);
     const double wanted = p.governor_slope * (no_load_speed(p, input) - speed);
     return wanted < -friction ? -friction : wanted > upper ? upper : wanted;
 }
@@ -84,7 +85,7 @@ inline EngineState engine_rate(const Engine& p, double peak, const EngineInput& 
         rate.torque =
             (torque_demand(p, peak, input, speed, full, state.boost) - state.torque) / p.actuator_lag;
     if (p.turbo_lag > 0) {
-        const double load = full > 0 && state.torque > 0 ? std::fmin(state.torque / full, 1) : 0;
+        const double load = full > 0 && state.torque > 0 ? std::min(state.torque / full, 1.) : 0;
         rate.boost = (load - state.boost) / p.turbo_lag;
     }
     return rate;

@@ -25,6 +25,7 @@
 // Does not model: flow forces, leakage, compressibility, a faster or slower emptying than filling.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -110,6 +111,7 @@ struct HydraulicState {
     double valve_rate = 0;  // [Pa/s]
     double piston = 0;      // x [m]
     double chamber = 0;     // p_c [Pa]
+    double steady = 0;      // steps for which the command has been the same, at most the slots of the delay line
 };
 
 // Slots that the delay line needs for the longest dead time (coldest oil).
@@ -139,6 +141,7 @@ inline HydraulicState hydraulic_rest(const ActuationHydraulic& p, double return_
     for (double& slot : delay_line) slot = pressure;
     HydraulicState state;
     state.slewed = state.valve = state.chamber = pressure;
+    state.steady = static_cast<double>(delay_line.size());
     state.piston = has_piston(p) ? balanced_stroke(p, return_pressure, pressure) : p.stroke;
     return state;
 }
@@ -206,6 +209,14 @@ inline void drive_valve(const ActuationHydraulic& p, const HydraulicOperator& op
     advance_valve(op, p.damping_ratio, state, dt - reach, 0);
 }
 
+// Within a millionth of a pascal of what it is told to be: it stays where it is, rather than creep there for ever.
+inline bool valve_rests(const HydraulicState& state, double target) noexcept {
+    constexpr double nothing = 1e-6;       // [Pa]
+    constexpr double no_rate = 1e-4;       // [Pa/s]
+    return state.slewed == target && std::fabs(state.valve - target) <= nothing &&
+           std::fabs(state.valve_rate) <= no_rate;
+}
+
 inline void advance_piston(const ActuationHydraulic& p, const HydraulicOperator& op, double return_pressure,
                            double pump_share, HydraulicState& state, HydraulicStep& step) noexcept {
     if (!has_piston(p)) {
@@ -241,6 +252,19 @@ inline void advance_piston(const ActuationHydraulic& p, const HydraulicOperator&
 
 }  // namespace detail
 
+inline double limited_command(const ActuationHydraulic& p, double command) noexcept {
+    return command < 0 ? 0 : command > p.maximum_pressure ? p.maximum_pressure : command;
+}
+
+// Nothing will change in a step with this command: the delay line holds nothing else, and valve and piston have
+// arrived. Advancing the state would leave all but `head` as it is.
+inline bool is_quiet(const ActuationHydraulic& p, const HydraulicState& state, std::size_t slots,
+                     double command) noexcept {
+    const double target = limited_command(p, command);
+    return state.slewed == target && state.valve == target && state.chamber == target && state.valve_rate == 0 &&
+           state.steady >= static_cast<double>(slots);
+}
+
 // One step with the pressure command `command` held over it. `valve_held`: the valve sticks and keeps its
 // outlet pressure.
 inline HydraulicStep advance_hydraulics(const ActuationHydraulic& p, const HydraulicOperator& op,
@@ -249,7 +273,9 @@ inline HydraulicStep advance_hydraulics(const ActuationHydraulic& p, const Hydra
                                         bool valve_held = false) noexcept {
     const std::size_t slots = delay_line.size();
     const auto head = static_cast<std::size_t>(state.head);
-    delay_line[head] = command < 0 ? 0 : command > p.maximum_pressure ? p.maximum_pressure : command;
+    delay_line[head] = limited_command(p, command);
+    const double before = delay_line[head > 0 ? head - 1 : slots - 1];
+    state.steady = delay_line[head] != before ? 0 : std::min(state.steady + 1, static_cast<double>(slots));
     state.head = static_cast<double>(head + 1 < slots ? head + 1 : 0);
     auto whole = static_cast<std::size_t>(op.dead_steps);
     double change = (op.dead_steps - static_cast<double>(whole)) * op.h;  // u_d changes here
@@ -257,11 +283,19 @@ inline HydraulicStep advance_hydraulics(const ActuationHydraulic& p, const Hydra
         whole = slots - 1;
         change = 0;
     }
-    const double late = delay_line[(head + slots - whole) % slots];
-    const double early = change > 0 ? delay_line[(head + 2 * slots - whole - 1) % slots] : late;
+    const std::size_t late_slot = head >= whole ? head - whole : head + slots - whole;
+    const double late = delay_line[late_slot];
+    const double early = change > 0 ? delay_line[late_slot > 0 ? late_slot - 1 : slots - 1] : late;
 
     HydraulicStep step;
     step.valve.begin = state.valve;
+    if (early == late && detail::valve_rests(state, late)) {
+        state.valve = late;
+        state.valve_rate = 0;
+        step.valve.middle = step.valve.end = state.valve;
+        detail::advance_piston(p, op, return_pressure, pump_share, state, step);
+        return step;
+    }
     if (valve_held) {
         state.slewed = state.valve;
         state.valve_rate = 0;

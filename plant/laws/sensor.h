@@ -45,6 +45,12 @@ inline std::uint64_t mix(std::uint64_t x) noexcept {  // splitmix64 finaliser
     return x ^ (x >> 31);
 }
 
+// The largest whole number not above x, |x| < 2^62.
+inline std::int64_t whole_below(double x) noexcept {
+    const auto whole = static_cast<std::int64_t>(x);
+    return static_cast<double>(whole) > x ? whole - 1 : whole;
+}
+
 }  // namespace detail
 
 // Normal deviate (mean 0, σ 1) of a seed, a stream and a count, by Box and Muller.
@@ -69,20 +75,24 @@ inline void advance_pickup(const SpeedSensor& p, SensorState& state, double begi
     const double travel = 0.5 * (begin + end) * h / pitch;  // [teeth]
     const double from = state.position, to = from + travel;
     const bool forward = travel >= 0;
-    const auto first = static_cast<std::int64_t>(forward ? std::floor(from) + 1 : std::ceil(from) - 1);
-    const auto last = static_cast<std::int64_t>(forward ? std::floor(to) : std::ceil(to));
+    const std::int64_t first = forward ? detail::whole_below(from) + 1 : -detail::whole_below(-from) - 1;
+    const std::int64_t last = forward ? detail::whole_below(to) : -detail::whole_below(-to);
     const std::int64_t count = forward ? last - first + 1 : first - last + 1;
-    int seen = 0;
-    double last_time = 0;
-    for (std::int64_t i = 0; i < count && i < 1000; ++i) {
-        const std::int64_t edge = forward ? first + i : first - i;
-        const std::int64_t tooth = ((edge % p.teeth) + p.teeth) % p.teeth;
-        if (tooth < missing_teeth) continue;
-        ++seen;
-        last_time = h * ((static_cast<double>(edge) - from) / travel);
+    std::int64_t seen = 0, last_seen = last;
+    if (missing_teeth <= 0) {
+        seen = count;
+    } else {
+        for (std::int64_t i = 0; i < count && i < 1000; ++i) {
+            const std::int64_t edge = forward ? first + i : first - i;
+            const std::int64_t tooth = ((edge % p.teeth) + p.teeth) % p.teeth;
+            if (tooth < missing_teeth) continue;
+            ++seen;
+            last_seen = edge;
+        }
     }
     if (seen > 0) {
-        const double speed = seen * pitch / (state.since_edge + last_time);
+        const double last_time = h * ((static_cast<double>(last_seen) - from) / travel);
+        const double speed = static_cast<double>(seen) * pitch / (state.since_edge + last_time);
         state.reading = p.directional && !forward ? -speed : speed;
         state.since_edge = h - last_time;
     } else {
@@ -91,7 +101,7 @@ inline void advance_pickup(const SpeedSensor& p, SensorState& state, double begi
         if (std::fabs(state.reading) > limit) state.reading = state.reading < 0 ? -limit : limit;
     }
     if (std::fabs(state.reading) < p.drop_out_speed) state.reading = 0;
-    state.position = to - teeth * std::floor(to / teeth);
+    state.position = to >= 0 && to < teeth ? to : to - teeth * std::floor(to / teeth);
 }
 
 // Faults on top of the reading; returns (and keeps) the output. `deviate` is noise(…) or 0.

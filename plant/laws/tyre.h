@@ -20,6 +20,7 @@
 // Does not model: side force, weight transfer, multi-pass soil compaction, tyre carcass inertia.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "plant/description.h"
@@ -42,14 +43,14 @@ inline TyreSoil tyre_soil(const BrixiusTyre& p, double mobility_number) noexcept
 inline double tyre_slip_rate(const BrixiusTyre& p, double kappa, double wheel_speed,
                              double body_speed) noexcept {
     const double rim = wheel_speed * p.radius;
-    const double rolling = std::fmax(std::fabs(rim), std::fabs(body_speed));
+    const double rolling = std::max(std::fabs(rim), std::fabs(body_speed));
     return (rim - body_speed - rolling * kappa) / p.relaxation_length;
 }
 
 // The slip s that the force sees, from κ and κ̇.
 inline double tyre_slip(const BrixiusTyre& p, double kappa, double kappa_rate, double wheel_speed,
                         double body_speed) noexcept {
-    const double rolling = std::fmax(std::fabs(wheel_speed * p.radius), std::fabs(body_speed));
+    const double rolling = std::max(std::fabs(wheel_speed * p.radius), std::fabs(body_speed));
     const double damping =
         p.slip_damping_time * p.relaxation_length / (p.relaxation_length + p.slip_damping_time * rolling);
     return kappa + damping * kappa_rate;
