@@ -29,7 +29,7 @@ void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcep
         const PairLaw& law = laws[k];
         const double load = s.load[k];
         s.holding[k] = load * law.friction.static_factor;
-        if (slips(contact[k]) && load != 0) {
+        if (contact[k] != locked && load != 0) {  // one that is about to engage shows what it would pass
             s.sliding[k] = sliding_capacity(law.friction, load, s.slip[k]);
             s.f[k] = slip_sign(contact[k]) * s.sliding[k];
         } else {

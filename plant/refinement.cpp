@@ -18,7 +18,7 @@ double largest_torque(const ModelData& m, const Sample& s) {
 
 }  // namespace
 
-bool is_coarse(const Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+bool is_coarse(const Work& w) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const Sample &begin = w.scratch.begin, &half = w.scratch.half, &late = w.scratch.late, &end = w.scratch.end;
     const double size = std::max(largest_torque(m, begin), largest_torque(m, end));
@@ -29,7 +29,6 @@ bool is_coarse(const Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         wrong = std::max(wrong, std::fabs(end.f[k] - late.f[k]));
     }
     if (wrong > force_tolerance * size) return true;
-    if (mode.step.halvings == 0) return false;
     // Twists half way, exact and by the cubic through both ends: what lies between does not show at the ends.
     const double h = end.at.time - begin.at.time;
     double hidden = 0;

@@ -101,7 +101,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         const double split = next_split(w, done);
         double until = part_end(done, split, length);
         integrate(w, *mode, until);
-        while (length > longest_whole && is_coarse(w, *mode)) {
+        while (length > longest_whole && is_coarse(w)) {
             length *= 0.5;
             until = part_end(done, split, length);
             integrate(w, *mode, until);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double at_rest = 1e-9;      // a pair that engages at less slip than this closes at once [rad/s]
 // Power that turns round by less is corrected, not located: loss that changes, of the largest torque.
-constexpr double small_loss = 1e-4, small_loss_of_swings = 1e-7;
+constexpr double small_loss = 1e-4, small_loss_of_parts = 1e-7;
 constexpr double overload = 1 + 1e-9; // torque over capacity that opens a closed pair
 
 const std::array<Link, 2>& pair_links(const Work& w, int pair) {
@@ -556,7 +556,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
     }
     w.scratch.turned = false;
     double size = 0;
-    const double small = mode.step.halvings == 0 ? small_loss : small_loss_of_swings;
+    const double small = m.description.maximum_parts == 1 ? small_loss : small_loss_of_parts;
     for (int k = m.pairs; k < m.contact_bytes; ++k) {
         if (w.contact[k] == stuck || mode.bound[k] || !mesh_of(w, k - m.pairs).lossy()) continue;
         const double g1 = turning_margin(w, k, end);
