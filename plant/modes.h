@@ -100,6 +100,7 @@ struct OperatorsData {
     std::uint64_t clock = 0;
     Mode* recent = nullptr;
     std::vector<unsigned char> wanted;  // key being looked up
+    std::vector<std::uint64_t> hashes;  // of the modes' keys
     // Inputs as they act and what follows from them alone; kept as long as the inputs are the same bits.
     std::vector<double> raw_input, input;
     std::vector<TyreSoil> soils;
