@@ -43,6 +43,18 @@ double part_end(double from, double split, double length) {
     return std::min(split, (std::floor(from / length + 1e-6) + 1) * length);
 }
 
+// Brings the beginning of the step to rest in itself. The end of a step that changed nothing is so already: every
+// device was looked at there.
+Mode& begin_mode(Work& w) SHIFTRIG_REALTIME {
+    ScratchData& s = w.scratch;
+    const bool begun = is_begun(w);
+    const bool settled = begun && s.moving_count == 0;
+    Mode& mode = settled ? find_mode(w.model, w.operators, w.contact, s) : settle(w, s.begin, begun);
+    // What it takes to find nothing to do is not counted: it depends on whether the last step is remembered.
+    if (std::equal(w.contact, w.contact + w.model.contact_bytes, s.before.begin())) w.outputs.certificate.mode_lookups = 1;
+    return mode;
+}
+
 // The engine for long chains, or the one for everything else.
 void integrate(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     if (mode.tree) {
@@ -92,7 +104,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
     // Torque capacities, external torques, internal torques, power-flow directions, internal torques with
     // losses ([Algin] eq. (11), (14), (15), (16)–(25)); what cannot hold at t0+ opens (eq. (12)).
-    Mode* mode = &settle(w, s.begin, is_begun(w));
+    Mode* mode = &begin_mode(w);
 
     double length = 1;  // of a part, at most
     const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.description.maximum_parts : 1);
@@ -124,7 +136,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
             mode = &correct_directions(w, *mode);
             accept(w);
             done = reached;
-            s.carries = true;
+            s.carries = !s.turned;
         }
 
         // The new state acts from here on; where events are used up, or by choice, from the next step on.
