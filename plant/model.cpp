@@ -208,6 +208,11 @@ void build_sizes(ModelData& m) {
     };
     for (const FrictionPair& pair : s.pairs) m.pair_slip.push_back(branchless(pair.links));
     for (const Mesh& mesh : s.meshes) m.mesh_motion.push_back(branchless(mesh.motion()));
+    for (const Mesh& mesh : s.meshes) {
+        const double slope = mesh.forward_efficiency - 1 / mesh.backward_efficiency;
+        m.lossy.push_back(mesh.lossy());
+        m.loss_kink.push_back(slope < 0 ? (mesh.forward_bearing - mesh.backward_bearing) / slope : mesh.forward_bearing / 2);
+    }
     for (const Mesh& mesh : s.meshes) m.mesh_slip.push_back(branchless(mesh.column(mesh.ratio)));
     for (const Mesh& mesh : s.meshes) {
         m.mesh_loss.push_back(branchless(std::array<Link, 2>{Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}}));

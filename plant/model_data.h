@@ -85,6 +85,8 @@ struct ModelData {
     // Slips and twist rates for the step: the housing is there mass 0 with factor 0, which needs no branch.
     std::vector<std::array<Link, 2>> pair_slip, mesh_motion, mesh_loss, shaft_rate, damper_rate, force_on;
     std::vector<std::array<Link, 3>> mesh_slip;
+    std::vector<unsigned char> lossy;     // per mesh
+    std::vector<double> loss_kink;        // torque at which the loss lines of both directions cross, moving forward [Nm]
     bool depends_on_time = false;         // waveforms: forces are no function of state and inputs alone
     std::vector<int> bearing_force;       // per mesh, −1: none
     std::vector<int> external_force;      // per mass, −1: none

@@ -49,11 +49,7 @@ double torque_scale(const Work& w, const Sample& s) {
 double loss_difference(const Mesh& mesh) { return 1 / mesh.backward_efficiency - mesh.forward_efficiency; }
 
 // Torque at which the two loss lines of a mesh cross: below it the second link drives.
-double loss_kink(const Mesh& mesh, double s) {
-    const double slope = mesh.forward_efficiency - 1 / mesh.backward_efficiency;
-    const double tau = slope < 0 ? (mesh.forward_bearing - mesh.backward_bearing) / slope : mesh.forward_bearing / 2;
-    return s * tau;
-}
+double loss_kink(const Work& w, int mesh, double sign) { return sign * w.model.loss_kink[static_cast<std::size_t>(mesh)]; }
 
 // On the engine for long chains, lossy meshes that others hold at rest carry torque without loss. On the other one they
 // may lean on their loss, see lean_on_losses().
@@ -88,10 +84,9 @@ Mode& find_directions(Work& w, unsigned char* contact, Sample& s, bool complete 
         double largest = -1;  // 1e-9 of the torque scale, once somebody asks
         for (int k = 0; k < m.meshes; ++k) {
             const unsigned char state = contact[m.pairs + k];
-            const Mesh& mesh = mesh_of(w, k);
-            if (state == stuck || !mesh.lossy()) continue;
+            if (state == stuck || !m.lossy[static_cast<std::size_t>(k)]) continue;
             const double sign = motion_sign(state);
-            const double torque = s.torque[m.pairs + k] - loss_kink(mesh, sign);
+            const double torque = s.torque[m.pairs + k] - loss_kink(w, k, sign);
             const int x = torque * sign < 0 ? -1 : 1;
             if (x == loss_exponent(state)) continue;
             if (largest < 0) largest = 1e-9 * torque_scale(w, s);
@@ -453,7 +448,7 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
         unsigned char& state = w.contact[m.pairs + k];
         const Mesh& mesh = mesh_of(w, k);
         if (state == stuck || !mesh.lossy() || mode.bound[m.pairs + k]) continue;
-        const double sign = motion_sign(state), kink = loss_kink(mesh, sign);
+        const double sign = motion_sign(state), kink = loss_kink(w, k, sign);
         const double from = (begin.torque[m.pairs + k] - kink) * sign * loss_exponent(state);
         const double to = (end.torque[m.pairs + k] - kink) * sign * loss_exponent(state);
         if (to >= 0 || from <= 0) continue;
@@ -510,7 +505,7 @@ double margin(const Work& w, int device, const Sample& s) {
 double turning_margin(const Work& w, int device, const Sample& s) {
     const unsigned char state = w.contact[device];
     const double sign = motion_sign(state);
-    return (s.torque[device] - loss_kink(mesh_of(w, device - w.model.pairs), sign)) * sign * loss_exponent(state);
+    return (s.torque[device] - loss_kink(w, device - w.model.pairs, sign)) * sign * loss_exponent(state);
 }
 
 }  // namespace
@@ -524,9 +519,32 @@ double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Samp
     return 0;
 }
 
+namespace {
+
+// Is every state good until the end of the part? The usual answer, quickly; a no only sends us to look closely.
+bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
+    const ModelData& m = w.model;
+    for (int k = 0; k < m.pairs; ++k) {
+        const unsigned char state = w.contact[k];
+        if (state == locked ? std::fabs(end.torque[k]) > end.holding[k] : slip_sign(state) * end.slip[k] < 0) return false;
+    }
+    for (int k = 0; k < m.meshes; ++k) {
+        const unsigned char state = w.contact[m.pairs + k];
+        if (!m.lossy[static_cast<std::size_t>(k)]) continue;
+        if (state == stuck || mode.bound[m.pairs + k]) return false;
+        if (motion_sign(state) * slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z) < 0) return false;
+        if (turning_margin(w, m.pairs + k, end) < 0) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
 Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
+    w.scratch.turned = false;
     Crossing first;
+    if (all_hold(w, mode, end)) return first;
     bool rates_known = false, middle_known = false;
     for (int k = 0; k < m.contact_bytes; ++k) {
         if (!violated(w, mode, k, end)) continue;
