@@ -20,6 +20,7 @@ namespace {
 
 struct Options {
     std::string recording, output, limits;
+    bool json = false;
 };
 
 // Only what is shown and judged: an hour of everything would not fit the memory.
@@ -35,11 +36,21 @@ std::vector<std::string> wanted_signals(const std::string& recording) {
     return wanted;
 }
 
+void print_json(const analysis::Scorecard& card) {
+    const nlohmann::json result = {{"verdict", analysis::name(card.verdict)}, {"shifts", analysis::to_json(card)}};
+    std::cout << result.dump(2) << '\n';
+}
+
 int run(const Options& options) {
+    if (options.output.empty() && !options.json) throw std::invalid_argument("report: -o FILE or --json is needed");
     const analysis::Limits limits =
         options.limits.empty() ? analysis::default_limits() : analysis::read_limits(options.limits);
     const analysis::Run run = analysis::load_run(options.recording, wanted_signals(options.recording));
     const analysis::Scorecard card = analysis::score(run, limits);
+    for (const auto& [name, value] : run.identity)
+        if (name == "incomplete") std::cerr << value << '\n';
+    if (options.json) print_json(card);
+    if (options.output.empty()) return good;
 
     analysis::ReportOptions report;
     report.title = run.machine.name;
@@ -53,9 +64,8 @@ int run(const Options& options) {
     file << analysis::report_html(run, analysis::shift_pages(run, card, limits), report);
     file.close();
     if (!file) throw std::runtime_error(options.output + ": cannot be written");
-    for (const auto& [name, value] : run.identity)
-        if (name == "incomplete") std::cerr << value << '\n';
-    std::cout << options.output << ": " << card.shifts.size() << " shifts, verdict "
+    if (!options.json)
+        std::cout << options.output << ": " << card.shifts.size() << " shifts, verdict "
               << analysis::name(card.verdict) << '\n';
     return good;
 }
@@ -63,13 +73,14 @@ int run(const Options& options) {
 Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<Options>();
     app.add_option("RECORDING", options->recording, "of shiftrig run --record")->required();
-    app.add_option("-o,--output", options->output, "the page (.html)")->required();
+    app.add_option("-o,--output", options->output, "the page (.html)");
+    app.add_flag("--json", options->json, "print the scorecard as one JSON object");
     app.add_option("--limits", options->limits,
                    "what is good and what is rejected (YAML); else config/limits.yaml as built in");
     return [options] { return run(*options); };
 }
 
-const Command command("report", "a recording as one self-contained HTML page", declare);
+const Command command("report", "a recording as one self-contained HTML page, or its scorecard as JSON", declare);
 
 }  // namespace
 

@@ -139,40 +139,48 @@ class OnLcm(unittest.TestCase):
             # What comes late for one of the controller's cycles is seen in the next.
             self.assertLessEqual(abs(found - expected), latency + control_cycle_s + 1e-9)
 
-    def test_logger_beside_the_rig_captures_what_its_recording_holds(self):
-        wire, recording = self.path("wire.log"), self.path("run.lcmlog")
-        with Beside("lcm-logger", "-q", "--lcm-url=" + URL, wire):
-            time.sleep(1)
-            self.lockstep_run("run.lcmlog", TCU, "--bus", BUS, "--lockstep")
-            time.sleep(0.5)
-        subprocess.run([RIG, "export", recording, "--csv", self.path("run.csv")], check=True, stderr=subprocess.DEVNULL)
-        with open(self.path("run.csv"), newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-        seen = {channel: [TYPES[kind].decode(data) for name, _, data in events(wire) if name == channel]
-                for channel, kind in (("SHIFTRIG_SPEEDS", "speeds_t"), ("SHIFTRIG_CLUTCH_COMMAND", "clutch_command_t"),
-                                      ("SHIFTRIG_PLANT_INFO", "plant_info_t"))}
+    def test_logger_beside_the_rig_captures_all_that_its_recording_holds(self):
+        # By the clock: of what lockstep sends as fast as it goes, lcm-logger's socket loses some. On a machine so busy that
+        # the logger is not let run for the tenth of a second its socket can hold, the run is done again.
+        for attempt in range(5):
+            wire, recording = self.path("wire_%d.log" % attempt), self.path("run_%d.lcmlog" % attempt)
+            with Beside("lcm-logger", "-q", "--lcm-url=" + URL, wire):
+                time.sleep(1)
+                with Beside(TCU, "--bus", BUS):
+                    self.run_rig(recording, "--pace", "wall", "--factor", "0.5", "--duration", "3")
+                time.sleep(0.5)
+            seen = {channel: [TYPES[kind].decode(data) for name, _, data in events(wire) if name == channel]
+                    for channel, kind in (("SHIFTRIG_SPEEDS", "speeds_t"), ("SHIFTRIG_CLUTCH_COMMAND", "clutch_command_t"),
+                                          ("SHIFTRIG_PLANT_INFO", "plant_info_t"))}
+            recorded = self.columns(recording)
+            ticks = len(recorded["time_s"])
+            speeds = {m["tick"]: m for m in seen["SHIFTRIG_SPEEDS"]}
+            if len(speeds) == ticks:
+                break
+        self.assertEqual(sorted(speeds), list(range(1, ticks + 1)))
+        self.assertIn("F3 locks", self.explained(recording))
+
         def names(field):
             return [bytes(n).split(b"\0")[0].decode() for n in seen["SHIFTRIG_PLANT_INFO"][0][field]]
-        speeds = {m["tick"]: m for m in seen["SHIFTRIG_SPEEDS"]}
-        self.assertGreater(len(speeds), 500)  # a busy machine lets the logger lose many of a burst
+
         sensors, clutches = names("sensor_name"), names("clutch_name")
         for tick, message in speeds.items():
-            row = rows[tick - 1]
             for i in range(message["sensor_count"]):
-                self.assertEqual(message["speed"][i], float(row["sensor.%s.speed_rad_s" % sensors[i]]), (tick, sensors[i]))
-        asked = {m["seq"]: m["tick"] for m in seen["SHIFTRIG_SPEEDS"]}
+                self.assertEqual(message["speed"][i], recorded["sensor.%s.speed_rad_s" % sensors[i]][tick - 1], (tick, sensors[i]))
+        # The command in force in a tick is the newest one's, by its age: it answers the speeds of so long ago.
+        commands = {m["sim_time_ns"]: m for m in seen["SHIFTRIG_CLUTCH_COMMAND"] if m["answers_seq"] >= 0}
         compared = 0
-        for command in seen["SHIFTRIG_CLUTCH_COMMAND"]:
-            tick = asked.get(command["answers_seq"])
-            if tick is None or tick >= len(rows):
+        for tick in range(ticks):
+            asked = round(tick - 1000 * recorded["bus.command_age_s"][tick])
+            if recorded["bus.clutch_command.status"][tick] != 1 or recorded["rig.safe_command"][tick] == 1:
                 continue
-            row = rows[tick]  # the tick after the question
+            command = commands[asked * 1_000_000]
             for i, clutch in enumerate(clutches[:command["clutch_count"]]):
                 column = "clutch.%s.pressure_command_pa" % clutch
-                if command["enable"][i] and column in row:
-                    self.assertEqual(command["pressure_pa"][i], float(row[column]), (tick, clutch))
+                if command["enable"][i] and column in recorded:
+                    self.assertEqual(command["pressure_pa"][i], recorded[column][tick], (tick, clutch))
                     compared += 1
-        self.assertGreater(compared, 500)
+        self.assertGreater(compared, 2 * ticks)
 
     def test_player_feeding_recorded_commands_reproduces_the_shift(self):
         # Recorded by the clock, played by the clock.

@@ -154,6 +154,13 @@ class Results(InAFolder):
             self.assertGreaterEqual(span["dur"], 0)
         self.assertEqual([e["args"]["slot"] for e in spans if e["name"] == "tick"], list(range(ticks)))
 
+    def test_a_recording_is_judged_as_its_run_was(self):
+        recording = self.path("shift.lcmlog")
+        judged = free("--record", recording)["shifts"]
+        done = subprocess.run([SHIFTRIG, "report", recording, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["shifts"], judged)
+
     def test_candump_log_takes_the_controllers_place(self):
         log = self.path("shift.log")
         first = free("--can-log", log)

@@ -1,16 +1,22 @@
 // The reader against anything at all. Two ways to run it:
 //   as a test (recording_fuzz_test): mutations of a sound recording, their checksums made right again or not, from a
 //   fixed seed; with the sanitizers in the asan build;
-//   with libFuzzer: clang++ -fsanitize=fuzzer,address -DSHIFTRIG_LIBFUZZER … (target recording_fuzz where the compiler is clang).
+//   with libFuzzer (fuzz_recording, docs/recording.md): whatever it comes upon, as it is and with its checksums made right.
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include <cstdint>
+#include <span>
 #include <string>
 
+#include "io/recording/checksum.h"
+#include "io/recording/event_log.h"
 #include "io/recording/reader.h"
 
 namespace {
+
+using shiftrig::io::crc32;
+using shiftrig::io::event_log_header_size;
 
 // Reads what there is; only RecordingError may come out.
 void read(const std::uint8_t* data, std::size_t size) {
@@ -30,27 +36,6 @@ void read(const std::uint8_t* data, std::size_t size) {
     }
     ::close(fd);
 }
-
-}  // namespace
-
-#ifdef SHIFTRIG_LIBFUZZER
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    read(data, size);
-    return 0;
-}
-
-#else
-
-#include <gtest/gtest.h>
-
-#include <cstring>
-#include <random>
-
-#include "synthetic_recording.h"
-
-namespace shiftrig::io {
-namespace {
 
 // Makes the checksums of all records right again, so that what is behind them is reached.
 std::string with_sound_checksums(const std::string& bytes) {
@@ -72,18 +57,34 @@ std::string with_sound_checksums(const std::string& bytes) {
     return result;
 }
 
+}  // namespace
+
+#ifdef SHIFTRIG_LIBFUZZER
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    read(data, size);
+    const std::string sound = with_sound_checksums({reinterpret_cast<const char*>(data), size});
+    read(reinterpret_cast<const std::uint8_t*>(sound.data()), sound.size());
+    return 0;
+}
+
+#else
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <random>
+
+#include "synthetic_recording.h"
+
+namespace shiftrig::io {
+namespace {
+
 class Fuzzed : public testing::TestWithParam<const char*> {};
 
 TEST_P(Fuzzed, RecordingNeverDoesMoreHarmThanOneLine) {
     synthetic::TemporaryFile file(GetParam());
-    Manifest small = synthetic::manifest();
-    small.model_text = "x";
-    small.initial_state.resize(100);
-    small.outputs.resize(20);
-    small.wall_clock = true;
-    RecordingOptions options;
-    options.keyframe_interval = 2;
-    synthetic::write(file.path, 6, options, small);
+    synthetic::write_small(file.path);
     const std::string sound = synthetic::read_file(file.path);
     std::mt19937 random(3);
     for (int trial = 0; trial < 1500; ++trial) {

@@ -125,6 +125,18 @@ inline RecordingSummary write(const std::string& path, int ticks, const Recordin
     return writer.end();
 }
 
+// Every kind of record, in as few bytes as it takes: what fuzzing begins with.
+inline RecordingSummary write_small(const std::string& path) {
+    Manifest small = manifest();
+    small.model_text = "x";
+    small.initial_state.resize(100);
+    small.outputs.resize(20);
+    small.wall_clock = true;
+    RecordingOptions options;
+    options.keyframe_interval = 2;
+    return write(path, 6, options, small);
+}
+
 inline bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }

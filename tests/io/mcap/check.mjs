@@ -41,7 +41,7 @@ for await (const message of reader.readMessages()) {
     const name = `${device}.${field}`;
     assert.ok(columnOf.has(name), `${name} is a column of the CSV`);
     assert.ok(Object.is(value, Number(row[columnOf.get(name)])), `${name} in row ${message.sequence}`);
-    if (/_(pa|rad_s|nm|j|w|n)$/.test(field)) assert.ok(schema.properties[field].unit, `${name} has a unit`);
+    if (/_(pa|rad_s|nm|j|w|n|m_s|m_s2|rad|degc)$/.test(field)) assert.ok(schema.properties[field].unit, `${name} has a unit`);
     fieldsSeen.add(name);
     ++values;
   }
