@@ -4,8 +4,8 @@
 //   z1 = P z0 + (Q_1 − 3Q_2 + 4Q_3) f0 + (4Q_2 − 8Q_3) fa + (4Q_3 − Q_2) fb
 //   a1 = a0 + h/6 (ȧ0 + 4 ȧa + ȧb)
 //
-// z speeds and twists, f forces, a auxiliary states (engine, tyre slip: not stiff), P = e^(hL),
-// Q_k = h φ_k(hL) S̃.
+// z coordinates of the mode, f forces, a auxiliary states (engine, tyre slip: not stiff), P = e^(hL),
+// Q_k = h φ_k(hL) S̃. What z0 and f0 give to all three comes from one product, what fa and fb add from one each.
 #include "plant/etd3.h"
 
 #include <algorithm>
