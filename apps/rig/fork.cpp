@@ -34,6 +34,7 @@ class Brancher {
         if (rebuilds_) model_.emplace(snapshot.model_text, snapshot.model_path);
         for (const auto& v : plan.variations())
             recalibrates_ = recalibrates_ || v.target == Variation::Target::calibration;
+        set_keys(plan.values(0));  // a key that is not there is not there in any branch
         rig_ = std::make_unique<Rig>(setup_);
         resume(*rig_, snapshot);  // if it does not fit, no branch can run
         ticks_ = std::llround(options.duration * 1e9 / static_cast<double>(setup_.tick_ns));
@@ -94,12 +95,20 @@ class Brancher {
                              ": no such signal, or without its unit's suffix; near: " + near);
     }
 
+    // The branch's values in the texts of the model and the calibration.
+    void set_keys(const std::vector<double>& values) {
+        const auto& variations = plan_.variations();
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const Variation& v = variations[i];
+            if (v.target == Variation::Target::model) model_->set(v.name, values[i], v.relative);
+            if (v.target == Variation::Target::calibration) calibration_->set(v.name, values[i], v.relative);
+        }
+    }
+
     void prepare(const std::vector<double>& values) {
         const auto& variations = plan_.variations();
+        set_keys(values);
         if (rebuilds_) {
-            for (std::size_t i = 0; i < values.size(); ++i)
-                if (variations[i].target == Variation::Target::model)
-                    model_->set(variations[i].name, values[i], variations[i].relative);
             Setup setup = setup_;
             setup.model = io::parse_model(model_->text(), snapshot_.model_path);
             for (const auto& [gear, option] : snapshot_.overrides)
@@ -108,9 +117,6 @@ class Brancher {
         }
         resume(*rig_, snapshot_);
         if (recalibrates_) {
-            for (std::size_t i = 0; i < values.size(); ++i)
-                if (variations[i].target == Variation::Target::calibration)
-                    calibration_->set(variations[i].name, values[i], variations[i].relative);
             rig_->buses().recalibrate(
                 tcu::parse_calibration(calibration_->root(), setup_.buses.calibration_path));
         }
