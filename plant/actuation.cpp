@@ -11,8 +11,12 @@ double input(const Work& w, int index) noexcept {
     return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)];
 }
 
-StepValues constant(double value) noexcept { return {value, value, value}; }
-StepValues complement(const StepValues& y) noexcept { return {1 - y.begin, 1 - y.middle, 1 - y.end}; }
+StepValues constant(double value) noexcept {
+    return {value, value, value};
+}
+StepValues complement(const StepValues& y) noexcept {
+    return {1 - y.begin, 1 - y.middle, 1 - y.end};
+}
 
 // Faults that override the actuation: stuck open, stuck closed.
 bool stuck_pair(const Work& w, const PairLaw& law, PairLoad& load) noexcept {
@@ -25,11 +29,15 @@ bool stuck_pair(const Work& w, const PairLaw& law, PairLoad& load) noexcept {
 bool changes(const PairLaw& law, const PairLoad& load) noexcept {
     if (load.fixed) return false;
     switch (law.source) {
-        case LoadSource::waveform: return true;
-        case LoadSource::hydraulic: return !load.hydraulic.rests();
+        case LoadSource::waveform:
+            return true;
+        case LoadSource::hydraulic:
+            return !load.hydraulic.rests();
         case LoadSource::release:
-        case LoadSource::apply: return load.values.begin != load.values.end;
-        default: return false;
+        case LoadSource::apply:
+            return load.values.begin != load.values.end;
+        default:
+            return false;
     }
 }
 
@@ -65,8 +73,9 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
         if (!law.hydraulic) continue;
         const auto i = static_cast<std::size_t>(k);
         const HydraulicState state = read_hydraulic(block + law.actuator);
-        w.scratch.quiet[i] = !law.hydraulic->solenoid && input(w, law.valve_stuck) <= 0.5 &&
-                             is_quiet(*law.hydraulic, state, static_cast<std::size_t>(law.delay_slots), input(w, law.command));
+        w.scratch.quiet[i] =
+            !law.hydraulic->solenoid && input(w, law.valve_stuck) <= 0.5 &&
+            is_quiet(*law.hydraulic, state, static_cast<std::size_t>(law.delay_slots), input(w, law.command));
         if (w.scratch.quiet[i]) continue;
         demand += fill_demand(*law.hydraulic, w.operators.hydraulics[i], law.friction.return_pressure, state);
     }
@@ -85,8 +94,12 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
             continue;
         }
         switch (law.source) {
-            case LoadSource::constant: load.values = constant(1); break;
-            case LoadSource::input: load.values = constant(input(w, law.command)); break;
+            case LoadSource::constant:
+                load.values = constant(1);
+                break;
+            case LoadSource::input:
+                load.values = constant(input(w, law.command));
+                break;
             case LoadSource::release:
                 load.values = complement(advance_lag(law.lag, block[law.actuator], input(w, law.command)));
                 break;
@@ -105,12 +118,14 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
                 if (hydraulic.solenoid) command = solenoid_pressure(*hydraulic.solenoid, state.play, command);
                 load.hydraulic = advance_hydraulics(
                     hydraulic, w.operators.hydraulics[i], law.friction.return_pressure, state,
-                    std::span<double>(block + law.actuator + hydraulic_slots, static_cast<std::size_t>(law.delay_slots)),
+                    std::span<double>(block + law.actuator + hydraulic_slots,
+                                      static_cast<std::size_t>(law.delay_slots)),
                     command, share, input(w, law.valve_stuck) > 0.5);
                 write_hydraulic(block + law.actuator, state);
                 break;
             }
-            default: break;
+            default:
+                break;
         }
         stuck_pair(w, law, load);
         load.moves = changes(law, load);
@@ -133,15 +148,24 @@ void hold_actuation(Work& w) SHIFTRIG_REALTIME {
             continue;
         }
         switch (law.source) {
-            case LoadSource::constant: load.values = constant(1); break;
-            case LoadSource::input: load.values = constant(input(w, law.command)); break;
-            case LoadSource::release: load.values = constant(1 - block[law.actuator]); break;
-            case LoadSource::apply: load.values = constant(block[law.actuator]); break;
+            case LoadSource::constant:
+                load.values = constant(1);
+                break;
+            case LoadSource::input:
+                load.values = constant(input(w, law.command));
+                break;
+            case LoadSource::release:
+                load.values = constant(1 - block[law.actuator]);
+                break;
+            case LoadSource::apply:
+                load.values = constant(block[law.actuator]);
+                break;
             case LoadSource::hydraulic:
                 load.scale = 1 - input(w, law.leak);
                 hold_pressure(w, k, read_hydraulic(block + law.actuator).chamber);
                 continue;
-            default: break;
+            default:
+                break;
         }
         stuck_pair(w, law, load);
         load.moves = law.source == LoadSource::waveform && !load.fixed;
@@ -166,8 +190,9 @@ double pair_load(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {
         const HydraulicStep& step = load.hydraulic;
         const bool before = at.fraction < step.filled_from ||
                             (at.side == Side::left && step.jumps() && at.fraction <= step.filled_from);
-        const double pressure =
-            before ? step.spring_begin + (step.spring_end - step.spring_begin) * at.fraction : step.valve.at(at.fraction);
+        const double pressure = before
+                                    ? step.spring_begin + (step.spring_end - step.spring_begin) * at.fraction
+                                    : step.valve.at(at.fraction);
         return load_from_pressure(law.friction, pressure * load.scale);
     }
     return load_from_engagement(law.friction, load.values.at(at.fraction));

@@ -35,7 +35,8 @@ void choose_coordinates(const ModelData& m, Mode& mode, double* expansion, doubl
             for (const Link& link : links) row[link.mass] += link.factor;
         });
         double square = 0;
-        for (int j = 0; j < n; ++j) square += row[j] * row[j] / m.structure.inertia[static_cast<std::size_t>(j)];
+        for (int j = 0; j < n; ++j)
+            square += row[j] * row[j] / m.structure.inertia[static_cast<std::size_t>(j)];
         row_length[r] = std::sqrt(square);
     }
     const auto is_pivot = [&](int mass, int count) {
@@ -47,7 +48,8 @@ void choose_coordinates(const ModelData& m, Mode& mode, double* expansion, doubl
         for (int j = 0; j < n; ++j) {
             if (is_pivot(j, r)) continue;
             for (int i = r; i < rows; ++i) {
-                const double size = std::fabs(reduced[i * n + j]) / (m.root_inertia[static_cast<std::size_t>(j)] * row_length[i]);
+                const double size = std::fabs(reduced[i * n + j]) /
+                                    (m.root_inertia[static_cast<std::size_t>(j)] * row_length[i]);
                 if (size <= largest) continue;
                 largest = size;
                 best = i;
@@ -102,7 +104,8 @@ void build_view(const ModelData& m, const Mode& mode, const double* expansion, d
         const double* z = expansion + c * m.states_padded;
         double* next = std::copy(z, z + m.states, view + c * rows);
         for (int k = 0; k < m.forces; ++k) {
-            const bool held = k < m.pairs && mode.bound[k];  // others hold it at zero: not even rounding is left
+            const bool held =
+                k < m.pairs && mode.bound[k];  // others hold it at zero: not even rounding is left
             *next++ = held ? 0 : slip(m.force_columns[static_cast<std::size_t>(k)], z);
         }
         for (int k = 0; k < m.meshes; ++k) *next++ = slip(m.mesh_loss[static_cast<std::size_t>(k)], z);
@@ -113,7 +116,8 @@ void build_view(const ModelData& m, const Mode& mode, const double* expansion, d
 }
 
 // A matrix over [z; f] (column-major) becomes one over [q; f].
-void fold(const ModelData& m, const Mode& mode, const double* expansion, const double* full, int rows, double* folded) {
+void fold(const ModelData& m, const Mode& mode, const double* expansion, const double* full, int rows,
+          double* folded) {
     for (int c = 0; c < mode.order; ++c) {
         double* column = folded + c * rows;
         std::fill(column, column + rows, 0.);
@@ -138,7 +142,8 @@ void build_balance(const ModelData& m, Mode& mode, const double* expansion, doub
                 for (const Link& a : row) {
                     for (const Link& b : links) {
                         if (a.mass < 0 || a.mass != b.mass) continue;
-                        full[c * rows + r] -= torque * a.factor * b.factor / s.inertia[static_cast<std::size_t>(a.mass)];
+                        full[c * rows + r] -=
+                            torque * a.factor * b.factor / s.inertia[static_cast<std::size_t>(a.mass)];
                     }
                 }
             });
@@ -176,7 +181,8 @@ void build_balance(const ModelData& m, Mode& mode, const double* expansion, doub
               folded + (mode.order + m.forces) * rows);
     for (int r = 0; r < mode.row_count; ++r) {
         double largest = 0;
-        for (int c = mode.order; c < columns; ++c) largest = std::max(largest, std::fabs(folded[c * rows + r]));
+        for (int c = mode.order; c < columns; ++c)
+            largest = std::max(largest, std::fabs(folded[c * rows + r]));
         for (int c = 0; c < columns; ++c) folded[c * rows + r] /= largest;
     }
     to_panels(folded, mode.row_count, columns, mode.balance);
@@ -190,8 +196,8 @@ int coordinates_workspace(const ModelData& m) noexcept {
            2 * widest * (m.columns + m.torques);
 }
 
-void build_coordinates(const ModelData& m, Mode& mode, const double* motion, const double* torque, double* workspace,
-                       int* integers) SHIFTRIG_REALTIME {
+void build_coordinates(const ModelData& m, Mode& mode, const double* motion, const double* torque,
+                       double* workspace, int* integers) SHIFTRIG_REALTIME {
     double* expansion = workspace;
     double* scratch = expansion + m.states_padded * m.states;
     choose_coordinates(m, mode, expansion, scratch, integers);
@@ -209,7 +215,8 @@ void build_coordinates(const ModelData& m, Mode& mode, const double* motion, con
         std::fill(column, column + all_rows, 0.);
         std::copy(torque + c * torque_rows, torque + c * torque_rows + mode.row_count, column);
         for (int i = 0; i < translating; ++i) {
-            column[mode.row_count + i] = motion[c * m.states_padded + m.translating[static_cast<std::size_t>(i)]];
+            column[mode.row_count + i] =
+                motion[c * m.states_padded + m.translating[static_cast<std::size_t>(i)]];
         }
     }
     double* folded = both + all_rows * m.columns;

@@ -35,8 +35,10 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     double* const at_half = s.vector_a.data();
     double* const at_late = at_half + block;
     double* const at_end = at_late + block;
-    multiply(op.from_begin, 3 * block, mode.order + m.forces, read_coordinates(mode, begin), nullptr, at_half);
-    for (int i = 0; i < m.auxiliary; ++i) half.auxiliary[i] = begin.auxiliary[i] + 0.5 * h * begin.auxiliary_rate[i];
+    multiply(op.from_begin, 3 * block, mode.order + m.forces, read_coordinates(mode, begin), nullptr,
+             at_half);
+    for (int i = 0; i < m.auxiliary; ++i)
+        half.auxiliary[i] = begin.auxiliary[i] + 0.5 * h * begin.auxiliary_rate[i];
     show(m, mode, at_half, half);
     evaluate_forces(w, w.contact, half);
 
@@ -49,8 +51,9 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
 
     multiply(op.from_late, block, m.forces, late.f, at_end, at_end);
     for (int i = 0; i < m.auxiliary; ++i) {
-        end.auxiliary[i] = begin.auxiliary[i] + h / 6 * (begin.auxiliary_rate[i] + 4 * half.auxiliary_rate[i] +
-                                                         late.auxiliary_rate[i]);
+        end.auxiliary[i] =
+            begin.auxiliary[i] +
+            h / 6 * (begin.auxiliary_rate[i] + 4 * half.auxiliary_rate[i] + late.auxiliary_rate[i]);
     }
     show(m, mode, at_end, end);
     evaluate_forces(w, w.contact, end);

@@ -24,12 +24,18 @@ void load_sample(const ModelData& m, const double* block, double time, Sample& s
 
 // Is the sample that the last step ended with the beginning of this one? Then its forces and torques are
 // what computing them again would give, bit for bit.
-bool is_carried(const ModelData& m, const OperatorsData& o, const double* block, const unsigned char* contact) {
+bool is_carried(const ModelData& m, const OperatorsData& o, const double* block,
+                const unsigned char* contact) {
     if (!o.carried || m.depends_on_time) return false;
     const Sample& s = o.samples[0];
-    const auto same = [](const void* a, const void* b, std::size_t bytes) { return std::memcmp(a, b, bytes) == 0; };
-    if (!same(s.z, block + m.layout.speeds, static_cast<std::size_t>(m.states) * sizeof(double))) return false;
-    if (!same(s.auxiliary, block + m.layout.auxiliary, static_cast<std::size_t>(m.auxiliary) * sizeof(double))) return false;
+    const auto same = [](const void* a, const void* b, std::size_t bytes) {
+        return std::memcmp(a, b, bytes) == 0;
+    };
+    if (!same(s.z, block + m.layout.speeds, static_cast<std::size_t>(m.states) * sizeof(double)))
+        return false;
+    if (!same(s.auxiliary, block + m.layout.auxiliary,
+              static_cast<std::size_t>(m.auxiliary) * sizeof(double)))
+        return false;
     if (!same(o.carried_contact.data(), contact, o.carried_contact.size())) return false;
     for (std::size_t e = 0; e < o.carried_modes.size(); ++e) {
         if (o.carried_modes[e] != block[m.layout.engines + 3 * static_cast<int>(e)]) return false;
@@ -45,7 +51,9 @@ void reset(Outputs& outputs, ScratchData& scratch) {
     scratch.begin_groups = nullptr;
 }
 
-double input(const Work& w, int index) { return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)]; }
+double input(const Work& w, int index) {
+    return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)];
+}
 
 void advance_temperatures(Work& w) {
     const ModelData& m = w.model;
@@ -56,10 +64,14 @@ void advance_temperatures(Work& w) {
         double* at = w.next + law.temperature;
         HeatState state{at[0], at[1]};
         advance_heat(law.heat_operator, state, w.scratch.heat[static_cast<std::size_t>(k)] / w.h, oil);
-        const auto passes = [&](double limit) { return limit > 0 && at[0] < limit && state.surface >= limit; };
+        const auto passes = [&](double limit) {
+            return limit > 0 && at[0] < limit && state.surface >= limit;
+        };
         const double end = w.start + w.h;
-        if (passes(law.heat->warn_temperature)) log_event(w, EventKind::facing_warning, k, end, 0, 0, state.surface);
-        if (passes(law.heat->fail_temperature)) log_event(w, EventKind::facing_failure, k, end, 0, 0, state.surface);
+        if (passes(law.heat->warn_temperature))
+            log_event(w, EventKind::facing_warning, k, end, 0, 0, state.surface);
+        if (passes(law.heat->fail_temperature))
+            log_event(w, EventKind::facing_failure, k, end, 0, 0, state.surface);
         at[0] = state.surface;
         at[1] = state.bulk;
     }
@@ -78,7 +90,8 @@ void advance_engine_modes(Work& w) {
             next_engine_mode(m.description.engines[e], mode, speed, start > 0.5 && at[2] <= 0.5, w.h, at[1]);
         const int device = m.pairs + m.meshes + static_cast<int>(e);
         if (next != mode && next != EngineMode::cranking) {
-            const EventKind kind = next == EngineMode::stalled ? EventKind::engine_stalls : EventKind::engine_starts;
+            const EventKind kind =
+                next == EngineMode::stalled ? EventKind::engine_stalls : EventKind::engine_starts;
             log_event(w, kind, device, w.start + w.h, state[0], 0, speed);
         }
         if (next != EngineMode::running) state[0] = state[1] = 0;
@@ -96,8 +109,8 @@ void advance_sensors(Work& w, const double* old_speeds) {
         SensorState state{at[0], at[1], at[2], at[3]};
         const SensorFaults faults{input(w, law.bias), input(w, law.noise), input(w, law.stuck) > 0.5,
                                   input(w, law.dropout) > 0.5, static_cast<int>(input(w, law.missing_teeth))};
-        advance_pickup(m.description.sensors[i], state, old_speeds[law.mass], w.next[m.layout.speeds + law.mass], w.h,
-                       faults.missing_teeth);
+        advance_pickup(m.description.sensors[i], state, old_speeds[law.mass],
+                       w.next[m.layout.speeds + law.mass], w.h, faults.missing_teeth);
         const double deviate = faults.noise > 0 ? noise(noise_seed, i, count) : 0;
         sensor_output(state, faults, deviate);
         at[0] = state.position;
@@ -138,7 +151,8 @@ double torque_residual(Work& w, const Mode& mode, const Sample& s) {
 
 double constraint_violation(const Work& w, const Mode& mode, const double* speeds) {
     double worst = 0;
-    for_rows(w.model, mode, [&](const auto& links) { worst = std::max(worst, std::fabs(slip_fast(links, speeds))); });
+    for_rows(w.model, mode,
+             [&](const auto& links) { worst = std::max(worst, std::fabs(slip_fast(links, speeds))); });
     return worst;
 }
 
@@ -148,14 +162,17 @@ void report_changes(Work& w, const Mode& mode) {
     const double end = w.start + w.h;
     const Sample& s = w.scratch.begin;
     for (int k = 0; k < m.meshes; ++k) {
-        const unsigned char was = w.scratch.before[static_cast<std::size_t>(m.pairs + k)], is = w.contact[m.pairs + k];
+        const unsigned char was = w.scratch.before[static_cast<std::size_t>(m.pairs + k)],
+                            is = w.contact[m.pairs + k];
         if (was == stuck || is == stuck || loss_exponent(was) == loss_exponent(is)) continue;
-        log_event(w, EventKind::drive_side, m.pairs + k, w.start, s.torque[m.pairs + k], 0, loss_exponent(is));
+        log_event(w, EventKind::drive_side, m.pairs + k, w.start, s.torque[m.pairs + k], 0,
+                  loss_exponent(is));
     }
     double& tie_up = w.next[m.layout.tie_up];
     if (mode.redundant) w.outputs.certificate.flags |= 1;
     for (int k = 0; mode.redundant && tie_up == 0 && k < m.pairs; ++k) {
-        if (mode.bound[k] & shares_load) log_event(w, EventKind::tie_up, k, end, s.torque[k], s.holding[k], 0);
+        if (mode.bound[k] & shares_load)
+            log_event(w, EventKind::tie_up, k, end, s.torque[k], s.holding[k], 0);
     }
     tie_up = mode.redundant ? 1 : 0;
     if (w.outputs.certificate.fall_backs > 0) log_event(w, EventKind::fall_back, -1, end, 0, 0, 0);
@@ -180,7 +197,8 @@ Work begin_step(const ModelData& m, OperatorsData& operators, State& state, Outp
     }
     std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
-        scratch.engine_modes[e] = static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
+        scratch.engine_modes[e] =
+            static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
     }
     outputs.certificate.mode_misses = -static_cast<std::int32_t>(operators.misses);
     return {m, operators, block, block, outputs, scratch, contact, time, h};
@@ -210,7 +228,8 @@ Work begin_look(const ModelData& m, OperatorsData& operators, const State& state
     load_sample(m, block, time, scratch.begin);
     std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
-        scratch.engine_modes[e] = static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
+        scratch.engine_modes[e] =
+            static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
     }
     outputs.certificate.mode_misses = -static_cast<std::int32_t>(operators.misses);
     return {m, operators, block, nullptr, outputs, scratch, scratch.before.data(), time, h};
@@ -265,7 +284,8 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
 void finish_look(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     Sample& s = w.scratch.begin;
     w.outputs.certificate.constraint_violation = constraint_violation(w, mode, s.z);
-    w.outputs.certificate.torque_residual = mode.tree ? w.scratch.torque_residual : torque_residual(w, mode, s);
+    w.outputs.certificate.torque_residual =
+        mode.tree ? w.scratch.torque_residual : torque_residual(w, mode, s);
     w.outputs.certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     w.outputs.event_count = 0;
     w.scratch.stored = stored_energy(w.model, s.z);

@@ -75,8 +75,8 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
         const EngineLaw& engine = m.engines[e];
         w.operators.engine_inputs[e] = {input(w, m.throttle), input(w, engine.speed_request_enable) > 0.5,
-                                      input(w, engine.speed_request), input(w, engine.torque_limit),
-                                      input(w, engine.fuel_cut) > 0.5};
+                                        input(w, engine.speed_request), input(w, engine.torque_limit),
+                                        input(w, engine.fuel_cut) > 0.5};
     }
     for (std::size_t i = 0; i < m.road_mass.size(); ++i) {
         known.grade_forces[i] = grade_force(m.description.roads[i], input(w, m.grade), m.description.gravity);
@@ -85,7 +85,8 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
     at_oil_temperature(m, w.operators, input(w, m.oil_temperature));
 }
 
-void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s, Extent extent) SHIFTRIG_REALTIME {
+void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s,
+                     Extent extent) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const Description& d = m.description;
     const OperatorsData& known = w.operators;
@@ -97,7 +98,9 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s, Ext
     }
     for (int k = m.first_external; k < m.forces; ++k) s.f[k] = 0;
     double input_power = 0, field_power = 0;
-    const auto add = [&](int mass, double torque) { s.f[m.external_force[static_cast<std::size_t>(mass)]] += torque; };
+    const auto add = [&](int mass, double torque) {
+        s.f[m.external_force[static_cast<std::size_t>(mass)]] += torque;
+    };
     const auto drive = [&](int mass, double torque) {
         add(mass, torque);
         input_power += torque * s.z[mass];
@@ -124,7 +127,8 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s, Ext
         const EngineMode mode = scratch.engine_modes[e];
         const double speed = s.z[law.mass];
         EngineState change;
-        if (mode == EngineMode::running) change = engine_rate(engine, law.peak, known.engine_inputs[e], state, speed);
+        if (mode == EngineMode::running)
+            change = engine_rate(engine, law.peak, known.engine_inputs[e], state, speed);
         rate[0] = change.torque;
         rate[1] = change.boost;
         s.engine_torque[e] = engine_torque(engine, law.peak, known.engine_inputs[e], state, mode, speed);
@@ -164,7 +168,8 @@ void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIF
     const ModelData& m = w.model;
     for (int k = 0; k < m.pairs; ++k) {
         s.f[k] = slip_sign(contact[k]) * s.sliding[k];
-        if (contact[k] == free_running && m.pair_laws[static_cast<std::size_t>(k)].drag > 0) s.f[k] = open_drag(w, k, s);
+        if (contact[k] == free_running && m.pair_laws[static_cast<std::size_t>(k)].drag > 0)
+            s.f[k] = open_drag(w, k, s);
     }
     bearing_forces(w, contact, s);
 }
@@ -173,7 +178,8 @@ void internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALT
     if (mode.tree) return tree_internal_torques(w, mode, s);
     const ModelData& m = w.model;
     const int rows = mode.row_count + static_cast<int>(m.translating.size());
-    m.kernel.multiply(mode.torques, padded(rows), mode.order + m.forces, read_coordinates(mode, s), nullptr, s.active);
+    m.kernel.multiply(mode.torques, padded(rows), mode.order + m.forces, read_coordinates(mode, s), nullptr,
+                      s.active);
     std::fill(s.torque, s.torque + m.torques, 0.);
     for (int r = 0; r < mode.row_count; ++r) s.torque[mode.rows[r]] = s.active[r];
 }

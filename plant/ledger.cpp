@@ -51,7 +51,8 @@ double fill_middle(Work& w, const Mode& mode) {
 // The parabola through the forces at start, middle and end with which the step was made, at the fraction s.
 void forces_at(const ScratchData& scratch, int count, double s, double* f) {
     const double w0 = (1 - s) * (1 - 2 * s), w1 = 4 * s * (1 - s), w2 = s * (2 * s - 1);
-    for (int k = 0; k < count; ++k) f[k] = w0 * scratch.begin.f[k] + w1 * scratch.half.f[k] + w2 * scratch.late.f[k];
+    for (int k = 0; k < count; ++k)
+        f[k] = w0 * scratch.begin.f[k] + w1 * scratch.half.f[k] + w2 * scratch.late.f[k];
 }
 
 // An even number, at least the two of Simpson's rule.
@@ -94,7 +95,8 @@ void book_finely(Work& w, const Mode& mode) {
             w.next[m.layout.distances + static_cast<int>(i)] += weight * at.z[m.translating[i]];
         }
         if (part == parts) break;
-        m.kernel.multiply(op.from_begin, 3 * block, mode.order + m.forces, read_coordinates(mode, at), nullptr, at_half);
+        m.kernel.multiply(op.from_begin, 3 * block, mode.order + m.forces, read_coordinates(mode, at),
+                          nullptr, at_half);
         forces_at(s, m.forces, (part + 0.5) / parts, forces);
         m.kernel.multiply(op.from_half, 2 * block, m.forces, forces, at_half + block, at_half + block);
         forces_at(s, m.forces, (part + 1.) / parts, forces);
@@ -131,7 +133,8 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const auto simpson = [h](double a, double b, double c) { return h / 6 * (a + 4 * b + c); };
     double heat_of_all = 0;
     for (int k = 0; k < m.pairs; ++k) {
-        const double heat = simpson(begin.f[k] * begin.slip[k], middle.f[k] * middle.slip[k], end.f[k] * end.slip[k]);
+        const double heat =
+            simpson(begin.f[k] * begin.slip[k], middle.f[k] * middle.slip[k], end.f[k] * end.slip[k]);
         w.scratch.heat[static_cast<std::size_t>(k)] += heat;
         heat_of_all += heat;
     }

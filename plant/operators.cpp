@@ -53,7 +53,8 @@ OperatorsData::OperatorsData(const ModelData& m) {
     engine_inputs.resize(m.engines.size());
     grade_forces.assign(m.road_mass.size(), 0.);
     sample_memory.assign(2 * sample_size(m), 0.);
-    for (std::size_t i = 0; i < 2; ++i) place_sample(m, samples[i], sample_memory.data() + i * sample_size(m));
+    for (std::size_t i = 0; i < 2; ++i)
+        place_sample(m, samples[i], sample_memory.data() + i * sample_size(m));
     carried_contact.assign(static_cast<std::size_t>(m.contact_bytes), 0);
     carried_modes.assign(m.engines.size(), 0.);
     hydraulics.resize(static_cast<std::size_t>(m.pairs));
@@ -107,7 +108,8 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
     const std::uint64_t hash = hash_of(o.wanted.data(), bytes);
     for (std::size_t i = 0; i < o.modes.size(); ++i) {
         Mode& mode = o.modes[i];
-        if (o.hashes[i] != hash || mode.last_use == 0 || std::memcmp(mode.key, o.wanted.data(), bytes) != 0) continue;
+        if (o.hashes[i] != hash || mode.last_use == 0 || std::memcmp(mode.key, o.wanted.data(), bytes) != 0)
+            continue;
         mode.last_use = ++o.clock;
         o.recent = &mode;
         return mode;

@@ -11,8 +11,8 @@ namespace detail {
 
 std::size_t sample_size(const ModelData& m) {
     const auto translating = static_cast<int>(m.translating.size());
-    return static_cast<std::size_t>(padded(m.seen) + m.states + m.forces + padded(m.torques + translating) + 4 +
-                                    2 * m.auxiliary + 3 * m.pairs + m.torques + m.states_padded) +
+    return static_cast<std::size_t>(padded(m.seen) + m.states + m.forces + padded(m.torques + translating) +
+                                    4 + 2 * m.auxiliary + 3 * m.pairs + m.torques + m.states_padded) +
            2 * m.tyres.size() + 2 * m.converters.size() + m.engines.size();
 }
 
@@ -42,7 +42,8 @@ ScratchData::ScratchData(const ModelData& m) {
     const std::size_t size = sample_size(m);
     Sample* const samples[] = {&half, &late, &middle};
     buffer.assign(size * std::size(samples), 0.);
-    for (std::size_t i = 0; i < std::size(samples); ++i) place_sample(m, *samples[i], buffer.data() + i * size);
+    for (std::size_t i = 0; i < std::size(samples); ++i)
+        place_sample(m, *samples[i], buffer.data() + i * size);
     loads.resize(static_cast<std::size_t>(m.pairs));
     held.assign(static_cast<std::size_t>(m.pairs), 0.);
     moving.assign(static_cast<std::size_t>(m.pairs), 0);
@@ -51,8 +52,9 @@ ScratchData::ScratchData(const ModelData& m) {
     const auto bytes = static_cast<std::size_t>(m.contact_bytes);
     for (auto* list : {&before, &trial, &release, &changed, &violations}) list->assign(bytes, 0);
     family.assign(bytes, 0);
-    const auto longest = static_cast<std::size_t>(std::max({3 * m.states_padded, padded(m.torques), 3 * m.forces}) +
-                                                  m.states_padded + m.columns + m.torques);
+    const auto longest =
+        static_cast<std::size_t>(std::max({3 * m.states_padded, padded(m.torques), 3 * m.forces}) +
+                                 m.states_padded + m.columns + m.torques);
     for (auto* vector : {&vector_a, &vector_b, &vector_c}) vector->assign(longest, 0.);
     torque_copy.assign(static_cast<std::size_t>(m.torques), 0.);
     heat.assign(static_cast<std::size_t>(m.pairs), 0.);

@@ -51,7 +51,8 @@ Mode& begin_mode(Work& w) SHIFTRIG_REALTIME {
     const bool settled = begun && s.moving_count == 0;
     Mode& mode = settled ? find_mode(w.model, w.operators, w.contact, s) : settle(w, s.begin, begun);
     // What it takes to find nothing to do is not counted: it depends on whether the last step is remembered.
-    if (std::equal(w.contact, w.contact + w.model.contact_bytes, s.before.begin())) w.outputs.certificate.mode_lookups = 1;
+    if (std::equal(w.contact, w.contact + w.model.contact_bytes, s.before.begin()))
+        w.outputs.certificate.mode_lookups = 1;
     return mode;
 }
 
@@ -66,7 +67,8 @@ void integrate(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME
 
 // Partial steps to where the device's margin vanishes: one as a rule, more where the margin is far from
 // its parabola (shafts that swing within the step). Returns the fraction reached; `end` is there.
-double approach(Work& w, const Mode& mode, const Crossing& crossing, double done, double until) SHIFTRIG_REALTIME {
+double approach(Work& w, const Mode& mode, const Crossing& crossing, double done,
+                double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 4;
     // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
     // beyond.

@@ -21,9 +21,9 @@ constexpr int taylor_degree = 11;
 // Square matrices of one size and their products through the model's kernel.
 struct Algebra {
     const Kernel& kernel;
-    int n;            // rows and columns
-    int stride;       // padded rows
-    double* panels;   // stride × stride
+    int n;           // rows and columns
+    int stride;      // padded rows
+    double* panels;  // stride × stride
 
     int size() const noexcept { return stride * n; }
     // c (columns wide) = a b
@@ -81,7 +81,8 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
             energy += m.structure.inertia[static_cast<std::size_t>(j)] * ratio * ratio;
         }
         const int twist = mode.coordinates[i] - m.masses;
-        sigma[i] = std::sqrt(twist < 0 ? energy : m.structure.shafts[static_cast<std::size_t>(twist)].stiffness);
+        sigma[i] =
+            std::sqrt(twist < 0 ? energy : m.structure.shafts[static_cast<std::size_t>(twist)].stiffness);
     }
     const auto rate = [&](int i, int c) {  // [L S̃](i, c)
         return mode.rates[panel_index(m.states_padded, columns, mode.coordinates[i], c)];
@@ -95,7 +96,9 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
         for (int i = 0; i < n; ++i) force[k * stride + i] = rate(i, n + k) * sigma[i];
     }
     double scale = 1;
-    for (double norm = norm1(z, n, stride); norm * scale > 0.5 && operators.halvings < 60; ++operators.halvings) scale *= 0.5;
+    for (double norm = norm1(z, n, stride); norm * scale > 0.5 && operators.halvings < 60;
+         ++operators.halvings)
+        scale *= 0.5;
     for (int i = 0; i < size; ++i) z[i] *= scale;
 
     // φ_3 = Σ Z^k/(k + 3)! in three groups of four powers.
@@ -135,13 +138,16 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
         }
     };
     // Writes one column of a block back in physical variables.
-    const auto put = [&](double* panels, int blocks, int block, int width, int c, const double* scaled, double factor) {
+    const auto put = [&](double* panels, int blocks, int block, int width, int c, const double* scaled,
+                         double factor) {
         for (int i = 0; i < stride; ++i) {
-            panels[panel_index(blocks * stride, width, block * stride + i, c)] = i < n ? factor * scaled[i] / sigma[i] : 0;
+            panels[panel_index(blocks * stride, width, block * stride + i, c)] =
+                i < n ? factor * scaled[i] / sigma[i] : 0;
         }
     };
     const auto put_transition = [&](int block) {
-        for (int j = 0; j < n; ++j) put(operators.from_begin, 3, block, columns, j, phi0 + j * stride, sigma[j]);
+        for (int j = 0; j < n; ++j)
+            put(operators.from_begin, 3, block, columns, j, phi0 + j * stride, sigma[j]);
     };
 
     for (int k = 0; k < operators.halvings; ++k) double_step();
@@ -151,7 +157,8 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
         put(operators.from_begin, 3, 0, columns, n + k, product + k * stride, 0.5 * length);
     }
     algebra.multiply(phi2, force, m.forces, product);
-    for (int k = 0; k < m.forces; ++k) put(operators.middle, 1, 0, m.forces, k, product + k * stride, 0.5 * length);
+    for (int k = 0; k < m.forces; ++k)
+        put(operators.middle, 1, 0, m.forces, k, product + k * stride, 0.5 * length);
 
     double_step();
     put_transition(1);

@@ -111,7 +111,7 @@ struct HydraulicState {
     double valve_rate = 0;  // [Pa/s]
     double piston = 0;      // x [m]
     double chamber = 0;     // p_c [Pa]
-    double steady = 0;      // steps for which the command has been the same, at most the slots of the delay line
+    double steady = 0;  // steps for which the command has been the same, at most the slots of the delay line
 };
 
 // Slots that the delay line needs for the longest dead time (coldest oil).
@@ -211,8 +211,8 @@ inline void drive_valve(const ActuationHydraulic& p, const HydraulicOperator& op
 
 // Within a millionth of a pascal of what it is told to be: it stays where it is, rather than creep there for ever.
 inline bool valve_rests(const HydraulicState& state, double target) noexcept {
-    constexpr double nothing = 1e-6;       // [Pa]
-    constexpr double no_rate = 1e-4;       // [Pa/s]
+    constexpr double nothing = 1e-6;  // [Pa]
+    constexpr double no_rate = 1e-4;  // [Pa/s]
     return state.slewed == target && std::fabs(state.valve - target) <= nothing &&
            std::fabs(state.valve_rate) <= no_rate;
 }
@@ -261,8 +261,8 @@ inline double limited_command(const ActuationHydraulic& p, double command) noexc
 inline bool is_quiet(const ActuationHydraulic& p, const HydraulicState& state, std::size_t slots,
                      double command) noexcept {
     const double target = limited_command(p, command);
-    return state.slewed == target && state.valve == target && state.chamber == target && state.valve_rate == 0 &&
-           state.steady >= static_cast<double>(slots);
+    return state.slewed == target && state.valve == target && state.chamber == target &&
+           state.valve_rate == 0 && state.steady >= static_cast<double>(slots);
 }
 
 // One step with the pressure command `command` held over it. `valve_held`: the valve sticks and keeps its
