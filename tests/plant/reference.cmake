@@ -23,3 +23,10 @@ add_test(NAME tractor_shift_test COMMAND tractor_shift_test)
 add_executable(agreement_test plant/agreement_test.cpp)
 target_link_libraries(agreement_test PRIVATE shiftrig_comparison GTest::gtest_main)
 gtest_discover_tests(agreement_test)
+
+# Very many steps by hand: shiftrig_long_run --steps 100000000 --parked 10000000
+add_executable(shiftrig_long_run plant/long_run_main.cpp)
+target_link_libraries(shiftrig_long_run PRIVATE shiftrig_plant shiftrig_model)
+target_compile_definitions(shiftrig_long_run PRIVATE SHIFTRIG_CONFIG="${PROJECT_SOURCE_DIR}/config")
+set_target_properties(shiftrig_long_run PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
+add_test(NAME long_run COMMAND shiftrig_long_run)
