@@ -25,6 +25,8 @@ bool keep(std::vector<Event>& kept, const Event& event) SHIFTRIG_REALTIME {
 }
 SHIFTRIG_TRUSTED_END
 
+constexpr std::size_t batch = 64;  // ticks that stay in the cache while they are turned over
+
 }  // namespace
 
 Collector::Collector(const Rig& rig, std::int64_t ticks, const CollectorOptions& options) {
@@ -42,16 +44,18 @@ Collector::Collector(const Rig& rig, std::int64_t ticks, const CollectorOptions&
     capacity_ = static_cast<std::size_t>(ticks);
     if (!fits(signals_.size())) capacity_ = options.most_bytes / sizeof(double) / (signals_.size() + 1);
 
-    const std::size_t room = capacity_ * (signals_.size() + 1);
-    rows_ = std::make_unique_for_overwrite<double[]>(room);
-    if (options.touched) std::fill_n(rows_.get(), room, 0.0);
+    row_room_ = options.by_the_clock ? capacity_ : std::min(batch, capacity_);
+    rows_ = std::make_unique<double[]>(row_room_ * (signals_.size() + 1));
+    for (const int signal : signals_) run_.columns.push_back({rig.signals().signal(signal), {}});
+    if (!options.by_the_clock) make_room(capacity_);
     plant_events_.reserve(options.most_events);
     rig_events_.reserve(options.most_events);
 }
 
 void Collector::take(const Rig& rig) SHIFTRIG_REALTIME {
     if (count_ < capacity_) {
-        double* row = &rows_[count_ * (signals_.size() + 1)];
+        if (row_count_ == row_room_) turn_over();
+        double* row = &rows_[row_count_++ * (signals_.size() + 1)];
         *row++ = rig.sim_time();
         for (const int signal : signals_) *row++ = rig.value(signal);
         ++count_;
@@ -63,20 +67,29 @@ void Collector::take(const Rig& rig) SHIFTRIG_REALTIME {
     for (const auto& event : rig.rig_events()) events_left_out_ += !keep(rig_events_, event);
 }
 
-analysis::Run Collector::finish(const Rig& rig) {
-    analysis::Run run;
-    run.time.reserve(count_);
-    for (const int signal : signals_) run.columns.push_back({rig.signals().signal(signal), {}});
-    for (auto& column : run.columns) column.value.reserve(count_);
+void Collector::make_room(std::size_t ticks) {
+    run_.time.reserve(ticks);
+    for (auto& column : run_.columns) column.value.reserve(ticks);
+}
+
+SHIFTRIG_TRUSTED_BEGIN  // the columns have their room
+void Collector::turn_over() SHIFTRIG_REALTIME {
     const std::size_t width = signals_.size() + 1;
-    constexpr std::size_t batch = 64;  // ticks that stay in the cache while they are turned over
-    for (std::size_t first = 0; first < count_; first += batch) {
-        const std::size_t end = std::min(first + batch, count_);
-        for (std::size_t i = first; i < end; ++i) run.time.push_back(rows_[i * width]);
-        for (std::size_t c = 0; c < run.columns.size(); ++c)
-            for (std::size_t i = first; i < end; ++i) run.columns[c].value.push_back(rows_[i * width + c + 1]);
+    for (std::size_t first = 0; first < row_count_; first += batch) {
+        const std::size_t end = std::min(first + batch, row_count_);
+        for (std::size_t i = first; i < end; ++i) run_.time.push_back(rows_[i * width]);
+        for (std::size_t c = 0; c < run_.columns.size(); ++c)
+            for (std::size_t i = first; i < end; ++i) run_.columns[c].value.push_back(rows_[i * width + c + 1]);
     }
+    row_count_ = 0;
+}
+SHIFTRIG_TRUSTED_END
+
+analysis::Run Collector::finish(const Rig& rig) {
+    make_room(count_);
+    turn_over();
     rows_.reset();
+    analysis::Run run = std::move(run_);
     const auto& devices = rig.model().device_names();
     for (const auto& event : plant_events_)
         run.changes.push_back({event, event.device >= 0 ? devices[static_cast<std::size_t>(event.device)] : "",

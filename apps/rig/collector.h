@@ -14,7 +14,7 @@ namespace shiftrig::rig {
 
 struct CollectorOptions {
     std::size_t most_bytes = std::size_t{256} << 20;
-    bool touched = true;  // the memory is in place before the first tick; false: where no clock runs, it comes as it is used
+    bool by_the_clock = true;  // take() has a deadline: memory is in place, columns wait. false: what takes least in all
     std::size_t most_events = 100'000;
     std::vector<std::string> only;  // keep these signals only; empty: all
 };
@@ -32,11 +32,17 @@ class Collector {
     std::int64_t events_left_out() const noexcept { return events_left_out_; }
 
   private:
+    void make_room(std::size_t ticks);   // in the columns
+    void turn_over() SHIFTRIG_REALTIME;  // rows into columns
+
     std::vector<int> signals_;
     std::vector<plant::Event> plant_events_;
     std::vector<RigEvent> rig_events_;
-    std::unique_ptr<double[]> rows_;  // time and signals, tick by tick: few cache lines in the loop; columns are made afterwards
-    std::size_t capacity_ = 0, count_ = 0;  // ticks
+    analysis::Run run_;
+    // Time and signals, tick by tick: few cache lines in the loop. Of the whole run where a clock runs, otherwise of a batch.
+    std::unique_ptr<double[]> rows_;
+    std::size_t row_room_ = 0, row_count_ = 0;  // ticks
+    std::size_t capacity_ = 0, count_ = 0;      // ticks
     std::int64_t left_out_ = 0, events_left_out_ = 0;
 };
 

@@ -90,7 +90,7 @@ analysis::TestResult run_one(const Options& options, const analysis::Limits& lim
         rig::CollectorOptions keep;
         keep.only = read_signals(rig);
         keep.most_bytes = std::size_t{2} << 30;
-        keep.touched = options.pacing() == rt::Pace::wall;
+        keep.by_the_clock = options.pacing() == rt::Pace::wall;
         rig::Collector collector(rig, loop.slots, keep);
         rig::SessionOptions session_options;
         session_options.loop = loop;
