@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -134,6 +135,46 @@ TEST(SocketCan, AnInterfaceThatIsTakenAwayAndMadeAgainIsSurvived) {
     const auto other = open_port("can:vcan7");
     ASSERT_TRUE(port->send(0, numbered(0x18FF1003, 77)));
     EXPECT_EQ(gather(*other, 1).size(), 1U);
+    shell("ip link del vcan7");
+}
+
+// The kernel tells the loss of an interface once: to a reader or to a writer.
+TEST(SocketCan, AnInterfaceThatIsTakenAwayWhileFramesAreSentIsSurvived) {
+    for (int i = 0; i < 5; ++i) {
+        ASSERT_EQ(shell("ip link add dev vcan7 type vcan && ip link set vcan7 up"), "");
+        const auto port = open_port("can:vcan7");
+        std::atomic<bool> stop{false};
+        std::thread sender([&] {
+            for (unsigned n = 0; !stop; ++n, std::this_thread::sleep_for(100us)) port->send(0, numbered(0x18FF1003, n));
+        });
+        shell("ip link del vcan7");
+        EXPECT_TRUE(eventually([&] { return port->state() == PortState::down; }));
+        shell("ip link add dev vcan7 type vcan && ip link set vcan7 up");
+        EXPECT_TRUE(eventually([&] { return port->state() == PortState::up; }));
+        shell("cansend vcan7 123#66");
+        EXPECT_EQ(gather(*port, 1).size(), 1U);
+        stop = true;
+        sender.join();
+        EXPECT_GE(port->counters().reconnects, 1U);
+        EXPECT_GT(port->counters().send_dropped, 0U);
+        shell("ip link del vcan7");
+    }
+}
+
+// A slow controller in miniature: a queue for three frames that lets 60 of them pass a second.
+TEST(SocketCan, FramesThatAFullQueueRefusesAreCountedAndNothingStops) {
+    ASSERT_EQ(shell("ip link add dev vcan7 type vcan && ip link set vcan7 up && "
+                    "tc qdisc add dev vcan7 root tbf rate 8kbit burst 64b limit 64b"), "");
+    const auto port = open_port("can:vcan7"), watcher = open_port("can:vcan7");
+    for (unsigned i = 0; i < 200; ++i) ASSERT_TRUE(port->send(0, numbered(0x18FF1003, i)));
+    ASSERT_TRUE(eventually([&] {
+        const auto c = port->counters();
+        return c.sent + c.send_dropped == 200U;
+    }));
+    EXPECT_GT(port->counters().send_dropped, 100U) << "ENOBUFS";
+    EXPECT_EQ(port->state(), PortState::up);
+    const auto sent = port->counters().sent;
+    EXPECT_EQ(gather(*watcher, sent).size(), sent);
     shell("ip link del vcan7");
 }
 
