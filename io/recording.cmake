@@ -6,5 +6,5 @@ file(GLOB RECORDING_SOURCES CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/record
 add_library(shiftrig_recording STATIC ${RECORDING_SOURCES})
 target_include_directories(shiftrig_recording SYSTEM PRIVATE ${ZSTD_INCLUDE_DIR})
 target_link_libraries(shiftrig_recording
-  PUBLIC shiftrig_signals shiftrig_lcmtypes shiftrig_model
+  PUBLIC shiftrig_signals shiftrig_lcmtypes shiftrig_model shiftrig_can
   PRIVATE nlohmann_json::nlohmann_json ${ZSTD_LIBRARY} Threads::Threads)

@@ -62,6 +62,9 @@ class Buses {
     std::vector<std::string> warnings() const;
     std::vector<std::string> summary() const;
     const tcu::Node* built_in() const noexcept { return node_.get(); }
+    // The controller's end of the in-process bus, for whoever embeds the rig with a controller of his own; nullptr if
+    // the built-in one sits there, or there is no such bus.
+    io::can::CanPort* far_end() noexcept { return wire_ && !node_ ? &wire_->end(1) : nullptr; }
 
   private:
     bool silent_at(std::int64_t now_ns) const SHIFTRIG_REALTIME;

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "apps/shiftrig/command.h"
+#include "io/recording/candump.h"
 #include "io/recording/csv.h"
 #include "io/recording/mcap.h"
 #include "io/recording/reader.h"
@@ -12,7 +13,7 @@ namespace shiftrig::cli {
 namespace {
 
 struct Options {
-    std::string recording, csv, mcap;
+    std::string recording, csv, mcap, candump;
 };
 
 using Export = std::int64_t (*)(io::RecordingReader&, const std::string&);
@@ -31,6 +32,7 @@ int run(const Options& options) {
     int worst = good;
     if (!options.csv.empty()) worst = std::max(worst, export_to(options, options.csv, io::export_csv));
     if (!options.mcap.empty()) worst = std::max(worst, export_to(options, options.mcap, io::export_mcap));
+    if (!options.candump.empty()) worst = std::max(worst, export_to(options, options.candump, io::export_candump));
     return worst;
 }
 
@@ -40,11 +42,12 @@ Command::Run declare(CLI::App& app) {
     auto* formats = app.add_option_group("formats");
     formats->add_option("--csv", options->csv, "a column per signal, a row per tick; - is standard output");
     formats->add_option("--mcap", options->mcap, "for Foxglove and PlotJuggler");
+    formats->add_option("--candump", options->candump, "the signals as frames of the machine's CAN mapping; python-can makes BLF or ASC of it");
     formats->require_option(1, 0);
     return [options] { return run(*options); };
 }
 
-const Command export_command("export", "a recording as CSV or MCAP", declare);
+const Command export_command("export", "a recording as CSV, MCAP or candump log", declare);
 
 }  // namespace
 

@@ -7,11 +7,13 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/shiftrig/command.h"
+#include "io/recording/candump.h"
 #include "io/recording/csv.h"
 #include "io/recording/field.h"
 #include "io/recording/reader.h"
 #include "io/recording/rebuild.h"
 #include "io/recording/replay.h"
+#include "io/units.h"
 
 namespace shiftrig::cli {
 
@@ -21,7 +23,7 @@ struct Options {
     std::string recording, model;
     double tolerance = 0;
     // Of a field recording only.
-    std::vector<std::string> locked, options;
+    std::vector<std::string> locked, options, held;
     double step_s = 1e-3;
     bool json = false;
 };
@@ -117,11 +119,36 @@ int run_on(io::RecordingReader& reader, const Options& options) {
     return good;
 }
 
+// Data of a real machine: a table, or the log of its bus as the model's stanza `can:` understands it.
+io::FieldRecording read_field(const Options& options, const io::ModelFile& file) {
+    if (!io::looks_like_candump(options.recording)) return io::read_field_csv(options.recording);
+    if (!file.can.IsDefined()) throw io::InputError(options.model, 0, 0, "has no stanza `can:`, which says what the frames mean");
+    return io::read_field_candump(options.recording, io::can::parse_mapping(file.can, file.path));
+}
+
+// An input that nobody measured: `environment.draft=1`.
+void hold_input(const std::string& held, io::FieldRecording& recording) {
+    const auto equals = held.find('=');
+    char* end = nullptr;
+    const double value = equals == std::string::npos ? 0 : std::strtod(held.c_str() + equals + 1, &end);
+    if (!end || *end != '\0' || end == held.c_str() + equals + 1)
+        throw io::InputError("--hold " + held + ": write INPUT=VALUE, as environment.draft=1");
+    io::FieldColumn column;
+    column.written = column.signal = held.substr(0, equals);
+    if (const auto* unit = io::unit_spelling(column.written)) {
+        column.signal = column.written.substr(0, equals - unit->suffix.size());
+        column.factor = unit->factor;
+    }
+    column.value.assign(recording.time.size(), value * column.factor);
+    recording.columns.push_back(std::move(column));
+}
+
 // A real machine's data against the model: how well do they fit?
 int run_field(const Options& options) {
-    const io::FieldRecording recording = io::read_field_csv(options.recording);
     if (options.model.empty()) throw io::InputError(options.recording + ": a field recording needs --model");
     io::ModelFile file = io::read_model(options.model);
+    io::FieldRecording recording = read_field(options, file);
+    for (const auto& held : options.held) hold_input(held, recording);
     for (const auto& option : options.options) {
         const auto equals = option.find('=');
         if (equals == std::string::npos)
@@ -157,7 +184,7 @@ int run_field(const Options& options) {
 }
 
 int run(const Options& options) {
-    if (options.recording.ends_with(".csv")) return run_field(options);
+    if (options.recording.ends_with(".csv") || io::looks_like_candump(options.recording)) return run_field(options);
     io::RecordingReader reader(options.recording);
     try {
         return run_on(reader, options);
@@ -169,16 +196,17 @@ int run(const Options& options) {
 Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<Options>();
     app.add_option("RECORDING", options->recording,
-                   "what `shiftrig run --record` wrote, or a real machine's data (.csv)")
+                   "what `shiftrig run --record` wrote, or a real machine's data (.csv, candump log)")
         ->required();
     app.add_option("--tolerance", options->tolerance,
                    "agree where |replayed - recorded| <= tolerance * max(1, |recorded|); 0: bit for bit")
         ->check(CLI::NonNegativeNumber);
     app.add_option("--model", options->model,
                    "another model under the same inputs: what would it have done?");
-    auto* field = app.add_option_group("field recordings (.csv)");
+    auto* field = app.add_option_group("field recordings (.csv, candump)");
     field->add_option("--locked", options->locked, "devices locked at the start: Fc,F2")->delimiter(',');
     field->add_option("--option", options->options, "gear option in use: range=M; repeatable");
+    field->add_option("--hold", options->held, "an input that was not measured, held: environment.draft=1; repeatable");
     field->add_option("--step", options->step_s, "step size of the plant [s]")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();

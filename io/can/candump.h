@@ -67,6 +67,8 @@ class CandumpReplay final : public CanPort {
     const std::string& description() const noexcept override { return name_; }
     std::size_t frames() const noexcept { return entries_.size(); }
     bool finished() const noexcept { return next_ == entries_.size(); }
+    // When the next frame comes; not to be asked when finished.
+    std::int64_t next_ns() const noexcept { return entries_[next_].timestamp_ns; }
 
   private:
     std::string name_;

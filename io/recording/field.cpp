@@ -115,6 +115,7 @@ FieldFit replay_field(const FieldRecording& recording, const plant::Model& model
     std::vector<Measured> measured;
     plant::Start start;
     start.locked = locked;
+    std::vector<std::pair<std::string, double>> measured_speeds;
     for (const auto& column : recording.columns) {
         if (const int input = model.input(column.signal); input >= 0) {
             const bool hold = signal_named(model.inputs(), column.signal)->unit == plant::Unit::one;
@@ -127,7 +128,7 @@ FieldFit replay_field(const FieldRecording& recording, const plant::Model& model
             fit.unit = signal_named(model.outputs(), column.signal)->unit;
             result.fits.push_back(fit);
             if (const std::string mass = mass_of(column.signal, model.description()); !mass.empty())
-                start.speeds.emplace_back(mass, column.value.front());
+                measured_speeds.emplace_back(mass, column.value.front());
         } else {
             result.ignored.push_back(column.written);
         }
@@ -145,6 +146,17 @@ FieldFit replay_field(const FieldRecording& recording, const plant::Model& model
         for (const auto& d : driven) inputs.value[d.input] = at(recording, *d.column, time, d.hold);
     };
     drive(recording.time.front());
+    // Measured speeds of masses that are rigidly coupled never agree to the bit: the first of them counts.
+    plant::start(model, state, start, inputs);
+    for (const auto& speed : measured_speeds) {
+        plant::Start more = start;
+        more.speeds.push_back(speed);
+        try {
+            plant::start(model, state, more, inputs);
+            start = more;
+        } catch (const plant::ModelError&) {
+        }
+    }
     plant::start(model, state, start, inputs);
 
     // Rows that fall into a step are held against its two ends, interpolated.

@@ -1,5 +1,0 @@
-# SHIFTRIG_FAULT_RUNS=1000 build/release/tests/bus_faults_test repeats what the suite does with 40 seeds.
-add_executable(bus_faults_test ${CMAKE_CURRENT_LIST_DIR}/bus_faults_test.cpp)
-target_link_libraries(bus_faults_test PRIVATE shiftrig_rig GTest::gtest_main)
-target_compile_definitions(bus_faults_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
-gtest_discover_tests(bus_faults_test DISCOVERY_MODE PRE_TEST)
