@@ -98,6 +98,7 @@ std::vector<std::string> Bus::summary() const {
                      {"implausible", r.implausible}, {"missed", r.missed}, {"time-outs", r.timeouts},
                      {"values limited", r.limited}, {"not sent", r.send_dropped}});
     const auto c = port_->counters();
+    if (name_ != "inprocess") add("as a whole", {{"frames sent", c.sent}, {"received", c.received}});
     add("as a whole", {{"frames not sent", c.send_dropped}, {"frames lost in reception", c.receive_dropped}, {"malformed", c.malformed},
                        {"error frames", c.error_frames}, {"times bus-off", c.bus_off_events}, {"reconnects", c.reconnects}});
     return lines;

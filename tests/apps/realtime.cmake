@@ -16,3 +16,7 @@ if(NOT CMAKE_CXX_FLAGS MATCHES "fsanitize" AND SHIFTRIG_BENCH)
   set_tests_properties(Soak.OneMinuteUnderStallsAndThreePassesOfAllScenarios PROPERTIES
     ENVIRONMENT "SHIFTRIG_PROGRAMS=${CMAKE_BINARY_DIR}" PASS_REGULAR_EXPRESSION "soak passed" LABELS slow)
 endif()
+
+add_test(NAME Soak.OneMinuteAtFullLoadOfTheBus COMMAND ${CMAKE_SOURCE_DIR}/scripts/soak bus --minutes 1)
+set_tests_properties(Soak.OneMinuteAtFullLoadOfTheBus PROPERTIES
+  ENVIRONMENT "SHIFTRIG_PROGRAMS=${CMAKE_BINARY_DIR}" PASS_REGULAR_EXPRESSION "soak passed" LABELS vcan)

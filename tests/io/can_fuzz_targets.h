@@ -1,8 +1,9 @@
 // What a fuzzer feeds: any bytes as a DBC file, as a candump log, as a datagram of python-can's, as frames on the bus.
-// Driven by can_fuzz_test.cpp (mutations from a seed, in the suite) and by can_fuzzer.cpp (libFuzzer, on request).
+// Driven by can_fuzz_test.cpp (mutations from a seed) and by can_fuzzer.cpp (libFuzzer, scripts/fuzz).
 #pragma once
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <span>
@@ -64,6 +65,7 @@ class FuzzedRig {
         link_.receive(now_ns_, table_);
         link_.send(now_ns_, table_);
         now_ns_ += 250'000;
+        ++frames_;
         static_cast<void>(bus_.end(1).receive(now_ns_, sink_));
     }
     // Twelve bytes a frame: identifier with flags, length, data.
@@ -89,6 +91,7 @@ class FuzzedRig {
         }
         return false;
     }
+    std::uint64_t frames() const { return frames_; }
     std::uint64_t good() const {
         std::uint64_t sum = 0;
         for (const auto& message : link_.report()) sum += message.sent_by_us ? 0 : message.good;
@@ -102,6 +105,20 @@ class FuzzedRig {
     CanLink link_{mapping_, bus_.end(0), table_};
     std::array<Frame, 64> sink_;
     std::int64_t now_ns_ = 0;
+    std::uint64_t frames_ = 0;
 };
+
+// One rig hears the frames of all inputs; at the end it says how many.
+inline void fuzz_frames(Bytes bytes) {
+    struct Telling : FuzzedRig {
+        ~Telling() {
+            std::fprintf(stderr, "%llu frames heard, %llu of them believed\n", static_cast<unsigned long long>(frames()),
+                         static_cast<unsigned long long>(good()));
+        }
+    };
+    static Telling rig;
+    rig.hear(bytes);
+    if (rig.wrong()) std::abort();
+}
 
 }  // namespace shiftrig::io::can
