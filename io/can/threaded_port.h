@@ -143,13 +143,17 @@ class ThreadedPort final : public CanPort {
                 if (stop_) return;  // and all that was queued has been written
                 continue;
             }
-            const SendResult result = state_ == PortState::up ? socket_.write(frame) : SendResult::lost;
+            PortState up = PortState::up;
+            const bool tried = state_ == up;
+            const SendResult result = tried ? socket_.write(frame) : SendResult::lost;
             if (result == SendResult::ok) {
                 ++counters_.sent;
                 command_latencies_.sent(frame.answers_ns);
             } else {
                 ++counters_.send_dropped;
             }
+            // The kernel tells a socket's error once, to whoever comes first: the reader might never hear of it.
+            if (tried && result == SendResult::lost) state_.compare_exchange_strong(up, PortState::down);
         }
     }
 
