@@ -1,4 +1,5 @@
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 
 #include "plant/model_data.h"
@@ -24,13 +25,21 @@ std::string explain(const Model& model, const Event& event) {
         case EventKind::engage:
             return line + say("engages: slip %.3f rad/s, capacity %.1f %s", event.slip, event.capacity, unit);
         case EventKind::release: return line + say("is free: slip %.3f rad/s", event.slip);
-        case EventKind::mesh_sticks: return line + say("sticks at rest under %.1f %s", event.torque, unit);
+        case EventKind::mesh_sticks:
+            return line + say("sticks: rest needs %.1f %s of its loss, which allows %.1f", std::fabs(event.torque), unit, event.capacity);
         case EventKind::mesh_releases:
-            return line + say("moves again: torque %.1f, its loss held %.1f %s", event.torque, event.capacity, unit);
+            return line + say("moves again: rest would need %.1f %s of its loss, which allows %.1f", std::fabs(event.torque), unit, event.capacity);
         case EventKind::drive_side:
             return line + (event.slip < 0 ? "is driven" : "drives") + say(": torque on its first link %.1f %s", event.torque, unit);
-        case EventKind::tie_up:
-            return line + say("carries %.1f %s in a loop of closed devices: the split is not unique", event.torque, unit);
+        case EventKind::tie_up: {
+            std::string loop;
+            const auto members = static_cast<std::uint64_t>(event.slip);
+            for (std::size_t k = 0; k < m.device_names.size() && k < 64; ++k) {
+                if (members >> k & 1) loop += (loop.empty() ? "" : ", ") + m.device_names[k];
+            }
+            return line + say("carries %.1f of %.1f %s in the closed loop of ", event.torque, event.capacity, unit) + loop +
+                   ": how they share the torque is not unique";
+        }
         case EventKind::fall_back: return line + "has more state changes in this step than are located: the rest act from the next step on";
         case EventKind::engine_stalls: return line + say("stalls at %.1f rad/s", event.slip);
         case EventKind::engine_starts: return line + say("runs at %.1f rad/s", event.slip);

@@ -46,6 +46,7 @@ bool is_carried(const ModelData& m, const OperatorsData& o, const double* block,
 void reset(Outputs& outputs, ScratchData& scratch) {
     outputs.certificate = {};
     outputs.event_count = 0;
+    scratch.told_events = 0;
     std::fill(scratch.heat.begin(), scratch.heat.end(), 0.);
     scratch.dissipated = scratch.input_work = 0;
     scratch.begin_groups = nullptr;
@@ -161,18 +162,28 @@ void report_changes(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
     const double end = w.start + w.h;
     const Sample& s = w.scratch.begin;
+    // Power that turns round in a mesh, once the mesh is loaded: idle pinions turn to and fro around nothing.
     for (int k = 0; k < m.meshes; ++k) {
-        const unsigned char was = w.scratch.before[static_cast<std::size_t>(m.pairs + k)],
-                            is = w.contact[m.pairs + k];
-        if (was == stuck || is == stuck || loss_exponent(was) == loss_exponent(is)) continue;
-        log_event(w, EventKind::drive_side, m.pairs + k, w.start, s.torque[m.pairs + k], 0,
-                  loss_exponent(is));
+        const unsigned char is = w.contact[m.pairs + k];
+        double& told = w.next[m.layout.drive_sides + k];
+        const int x = loss_exponent(is);
+        if (is == stuck || told == x || std::fabs(s.torque[m.pairs + k]) < m.noteworthy_torque) continue;
+        if (!m.structure.meshes[static_cast<std::size_t>(k)].lossy()) continue;
+        if (told != 0) log_event(w, EventKind::drive_side, m.pairs + k, end, s.torque[m.pairs + k], 0, x);
+        told = x;
     }
+    // A loop that has become closed: one event, its members as a set of bits in place of the slip.
     double& tie_up = w.next[m.layout.tie_up];
     if (mode.redundant) w.outputs.certificate.flags |= 1;
-    for (int k = 0; mode.redundant && tie_up == 0 && k < m.pairs; ++k) {
-        if (mode.bound[k] & shares_load)
-            log_event(w, EventKind::tie_up, k, end, s.torque[k], s.holding[k], 0);
+    if (mode.redundant && tie_up == 0) {
+        int first = -1;
+        double members = 0;
+        for (int k = std::min(m.pairs, most_members) - 1; k >= 0; --k) {
+            if (!(mode.bound[k] & shares_load)) continue;
+            members += std::ldexp(1., k);
+            first = k;
+        }
+        if (first >= 0) log_event(w, EventKind::tie_up, first, end, s.torque[first], s.holding[first], members);
     }
     tie_up = mode.redundant ? 1 : 0;
     if (w.outputs.certificate.fall_backs > 0) log_event(w, EventKind::fall_back, -1, end, 0, 0, 0);

@@ -194,6 +194,11 @@ void build_sizes(ModelData& m) {
     m.contact_bytes = m.pairs + m.meshes;
     m.auxiliary = static_cast<int>(m.description.tyres.size() + 2 * m.description.engines.size());
     for (double inertia : s.inertia) m.root_inertia.push_back(std::sqrt(inertia));
+    for (const FrictionPair& pair : s.pairs) {
+        const double noteworthy = 1e-2 * pair.nominal_capacity;
+        if (pair.kind != PairKind::clutch || (m.noteworthy_torque > 0 && noteworthy > m.noteworthy_torque)) continue;
+        m.noteworthy_torque = noteworthy;
+    }
     for (double inertia : s.inertia) m.energy_factor.push_back(0.5 * inertia);
     for (const Elastic& shaft : s.shafts) m.energy_factor.push_back(0.5 * shaft.stiffness);
     for (int j = 0; j < m.masses; ++j) {
@@ -280,6 +285,7 @@ void build_layout(ModelData& m) {
     at.engines = take(3 * static_cast<int>(m.engines.size()));
     at.sensors = take(4 * static_cast<int>(m.sensors.size()));
     at.tie_up = take(1);
+    at.drive_sides = take(m.meshes);
     at.size = next;
     for (PairLaw& law : m.pair_laws) {
         if (law.actuator >= 0) law.actuator += at.actuators;

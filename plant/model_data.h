@@ -90,6 +90,7 @@ struct ModelData {
     bool depends_on_time = false;         // waveforms: forces are no function of state and inputs alone
     std::vector<int> bearing_force;       // per mesh, −1: none
     std::vector<int> external_force;      // per mass, −1: none
+    double noteworthy_torque = 0;         // 1 % of the weakest clutch: less is idling [Nm]
     std::vector<double> root_inertia;     // √J
     std::vector<double> energy_factor;    // by state: J/2, then k/2
     std::vector<int> translating;         // masses

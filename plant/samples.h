@@ -95,6 +95,7 @@ struct ScratchData {
     std::vector<int> workspace_index;
     std::vector<double> operator_memory, ledger_memory;  // operators of a partial step, of a part of one
     const Mode* begin_groups = nullptr;  // mode in which the tree's begin.groups hold for `begin`
+    int told_events = 0;                 // so many of this step's events are told in full
     bool turned = false;                 // power turned round in some mesh within the last part
     double torque_residual = 0;          // of the tree's internal torques at `end`
     StepOperators used;              // by the last advance

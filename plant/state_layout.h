@@ -13,6 +13,7 @@
 //   engine                mode, cranking time [s], last start input
 //   sensor                4 per sensor (laws/sensor.h)
 //   tie-up                1 while a torque split is not unique
+//   drive side            of each mesh as last told: x, 0 never
 #pragma once
 
 #include <cstdint>
@@ -25,7 +26,7 @@ namespace shiftrig::plant::detail {
 struct StateLayout {
     static constexpr int header = 4;
     int speeds = 0, twists = 0, distances = 0, auxiliary = 0, contact = 0, actuators = 0, heat = 0,
-        temperatures = 0, energy = 0, engines = 0, sensors = 0, tie_up = 0, size = 0;
+        temperatures = 0, energy = 0, engines = 0, sensors = 0, tie_up = 0, drive_sides = 0, size = 0;
 };
 
 inline std::int64_t read_integer(const double* slot) noexcept {

@@ -318,13 +318,43 @@ double release_drive(Work& w, const Mode& mode, int leader, Sample& s) {
     return std::max(best, -1e10 * threshold);  // held whatever is tried: finite, for the search of an instant
 }
 
+// What a stuck mesh takes to stay at rest, and the loss it has at its torque if it moves that way.
+struct LossAtRest {
+    double needed, allowed;
+};
+LossAtRest loss_at_rest(const Work& w, int k, const Sample& s) {
+    const ModelData& m = w.model;
+    const Mesh& mesh = mesh_of(w, k);
+    const double needed = s.torque[m.pairs + m.meshes + k], sign = needed < 0 ? -1 : 1;
+    const double torque = sign * s.torque[m.pairs + k];
+    const bool drives = torque >= sign * loss_kink(mesh, sign);
+    const double allowed = drives ? (1 - mesh.forward_efficiency) * torque + mesh.forward_bearing
+                                  : (1 - 1 / mesh.backward_efficiency) * torque + mesh.backward_bearing;
+    return {needed, allowed};
+}
+
+// Closings are told with the torques that they lead to.
+void tell_closings(Work& w, const Sample& s) {
+    const int count = std::min(w.outputs.event_count, Outputs::event_capacity);
+    for (int& i = w.scratch.told_events; i < count; ++i) {
+        Event& event = w.outputs.events[static_cast<std::size_t>(i)];
+        if (event.kind == EventKind::lock) {
+            event.torque = s.torque[event.device];
+        } else if (event.kind == EventKind::mesh_sticks) {
+            const LossAtRest loss = loss_at_rest(w, event.device - w.model.pairs, s);
+            event.torque = loss.needed;
+            event.capacity = loss.allowed;
+        }
+    }
+}
+
 bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
     if (release_drive(w, mode, leader, s) <= 0) return false;
     const ModelData& m = w.model;
-    const double held = s.torque[m.pairs + m.meshes + leader];
     for (int k = m.pairs; k < m.contact_bytes; ++k) {
         if (w.contact[k] != stuck || w.scratch.release[static_cast<std::size_t>(k)] == stuck) continue;
-        log_event(w, EventKind::mesh_releases, k, s.at.time, s.torque[k], held, 0);
+        const LossAtRest loss = loss_at_rest(w, k - m.pairs, s);
+        log_event(w, EventKind::mesh_releases, k, s.at.time, loss.needed, loss.allowed, 0);
     }
     std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);
     contact_forces(w, w.contact, s);
@@ -483,13 +513,19 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
         evaluate_forces(w, w.contact, s);
     }
     if (engage_and_release(w, s)) complete = false;
+    const int most_passes = 2 * w.model.contact_bytes + 2;
     for (int passes = 0;; ++passes, complete = false) {
         Mode& mode = find_directions(w, w.contact, s, complete);
-        if (passes > 2 * w.model.contact_bytes + 2) return mode;
-        if (release_stuck_meshes(w, mode, s)) continue;
-        const Use worst = most_used(w, s);
-        if (!is_overloaded(w, worst.pair, s)) return mode;
-        if (!lean_on_losses(w, mode, worst.share, s)) open(w, mode, worst.pair, s);
+        if (passes <= most_passes) {
+            if (release_stuck_meshes(w, mode, s)) continue;
+            const Use worst = most_used(w, s);
+            if (is_overloaded(w, worst.pair, s)) {
+                if (!lean_on_losses(w, mode, worst.share, s)) open(w, mode, worst.pair, s);
+                continue;
+            }
+        }
+        if (w.scratch.told_events < w.outputs.event_count) tell_closings(w, s);
+        return mode;
     }
 }
 
