@@ -481,9 +481,10 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
         const double sign = motion_sign(state), kink = loss_kink(w, k, sign);
         const double from = (begin.torque[m.pairs + k] - kink) * sign * loss_exponent(state);
         const double to = (end.torque[m.pairs + k] - kink) * sign * loss_exponent(state);
-        if (to >= 0 || from <= 0) continue;
+        // From no torque at all (a clutch that begins to press) it is the wrong loss all along; rounding is not that.
+        if (to >= 0 || (from <= 0 && -to <= 1e-6 * m.noteworthy_torque)) continue;
         if (longest == 0) std::fill(change, change + m.masses, 0.);
-        const double rest = to / (to - from) * h;  // of the part, after the reversal [s]
+        const double rest = to / (to - std::max(from, 0.)) * h;  // of the part, after the reversal [s]
         const unsigned char turned = state ^ driven;
         const double given = 0.5 * rest * (end.torque[m.pairs + k] - kink) *
                              (mesh.force_ratio(loss_exponent(turned)) - mesh.force_ratio(loss_exponent(state)));
