@@ -327,7 +327,7 @@ LossAtRest loss_at_rest(const Work& w, int k, const Sample& s) {
     const Mesh& mesh = mesh_of(w, k);
     const double needed = s.torque[m.pairs + m.meshes + k], sign = needed < 0 ? -1 : 1;
     const double torque = sign * s.torque[m.pairs + k];
-    const bool drives = torque >= sign * loss_kink(mesh, sign);
+    const bool drives = torque >= sign * loss_kink(w, k, sign);
     const double allowed = drives ? (1 - mesh.forward_efficiency) * torque + mesh.forward_bearing
                                   : (1 - 1 / mesh.backward_efficiency) * torque + mesh.backward_bearing;
     return {needed, allowed};
