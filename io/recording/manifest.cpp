@@ -1,5 +1,7 @@
 #include "io/recording/manifest.h"
 
+#include <utility>
+
 #include <nlohmann/json.hpp>
 
 #include "io/recording/checksum.h"
@@ -42,6 +44,17 @@ std::vector<plant::Signal> signals_of(const json& list) {
     return signals;
 }
 
+// A whole number that fits: the library would make one of anything.
+template <class Integer>
+void whole(const json& document, const char* key, Integer& value) {
+    const json& entry = document.at(key);
+    const bool fits = entry.is_number_unsigned()
+                          ? std::in_range<Integer>(entry.get<std::uint64_t>())
+                          : entry.is_number_integer() && std::in_range<Integer>(entry.get<std::int64_t>());
+    if (!fits) throw RecordingError("its manifest has no fitting whole number as " + std::string(key));
+    value = entry.get<Integer>();
+}
+
 }  // namespace
 
 std::string Manifest::model_hash() const {
@@ -79,7 +92,8 @@ std::string Manifest::to_json() const {
 Manifest Manifest::from_json(const std::string& text) {
     try {
         const json document = json::parse(text);
-        const int version = document.at("shiftrig_recording").get<int>();
+        int version = 0;
+        whole(document, "shiftrig_recording", version);
         if (version != format_version)
             throw RecordingError("is a recording of format " + std::to_string(version) +
                                  ", this program reads format " + std::to_string(format_version));
@@ -89,19 +103,21 @@ Manifest Manifest::from_json(const std::string& text) {
         document.at("overrides").get_to(m.overrides);
         document.at("facts").get_to(m.facts);
         document.at("step_size_s").get_to(m.step_size);
-        document.at("substeps").get_to(m.substeps);
-        document.at("tick_ns").get_to(m.tick_ns);
+        whole(document, "substeps", m.substeps);
+        whole(document, "tick_ns", m.tick_ns);
         document.at("kernel").get_to(m.kernel);
-        document.at("seed").get_to(m.seed);
-        document.at("first_tick").get_to(m.first_tick);
+        whole(document, "seed", m.seed);
+        whole(document, "first_tick", m.first_tick);
         document.at("wall_clock").get_to(m.wall_clock);
-        document.at("start_utime_us").get_to(m.start_utime);
+        whole(document, "start_utime_us", m.start_utime);
         m.inputs = signals_of(document.at("inputs"));
         m.outputs = signals_of(document.at("outputs"));
         m.rig = signals_of(document.at("rig"));
         document.at("devices").get_to(m.devices);
         if (!(m.step_size > 0) || m.substeps < 1 || m.substeps > 1'000'000 || m.tick_ns < 1)
             throw RecordingError("its manifest has an impossible step size");
+        if (m.first_tick < 0 || m.start_utime < 0 || m.start_utime > std::int64_t{1} << 60)
+            throw RecordingError("its manifest has an impossible beginning");
         return m;
     } catch (const json::exception& error) {
         throw RecordingError(std::string("its manifest cannot be read: ") + error.what());

@@ -153,6 +153,10 @@ void RecordingReader::Implementation::read_header() {
             damaged("an opening record");
             throw RecordingError(complaint);
         }
+        if (chunk.utime < 0 || event.time_us < 0) {
+            damaged("the time of an opening record");
+            throw RecordingError(complaint);
+        }
         opening_times.push_back(event.time_us - chunk.utime);
         ++number;
     }
@@ -310,7 +314,7 @@ bool RecordingReader::Implementation::next(RecordedTick& tick) {
 bool RecordingReader::Implementation::take_closing(RecordedTick& tick, std::int32_t blocks) {
     const record_tick_t& closing = tick.closing;
     if (closing.blocks != blocks || closing.events != static_cast<std::int32_t>(tick.events.size()) ||
-        tick.lost_before < 0 || closing.seq != previous_tick + 1 + tick.lost_before)
+        closing.seq <= previous_tick || closing.seq - previous_tick - 1 != tick.lost_before)
         return damaged("tick " + std::to_string(closing.seq) + " is not whole");
     tick.tick = closing.seq;
     tick.sim_time_ns = closing.sim_time_ns;
