@@ -7,7 +7,7 @@ TreeKernel tree_kernel_portable() noexcept {
     return kernel;
 }
 
-TreeKernel choose_tree_kernel(KernelKind kind) {
+TreeKernel choose_tree_kernel([[maybe_unused]] KernelKind kind) {
 #if defined(SHIFTRIG_X86_KERNELS)
     if (kind == KernelKind::avx512) return tree_kernel_avx512();
     if (kind == KernelKind::avx2) return tree_kernel_avx2();
