@@ -77,7 +77,9 @@ class Attacked(unittest.TestCase):
         with open(self.folder + "/served.csv", encoding="utf-8") as file:
             head, *rows = [line.rstrip("\n").split(",") for line in file]
         column = head.index("driver.throttle")
-        self.assertEqual({float(row[column]) for row in rows}, throttle)
+        # A command that comes before the first tick leaves nothing of what was before it.
+        self.assertLessEqual({float(row[column]) for row in rows}, set(throttle))
+        self.assertEqual(float(rows[-1][column]), throttle[-1])
 
     def test_nobody_without_the_right_to_it_moves_the_rig(self):
         rig = Served(self.folder)
@@ -100,7 +102,7 @@ class Attacked(unittest.TestCase):
         ]:
             self.assertRegex(answer, r"^HTTP/1\.1 %d " % status)
             self.assertGreater(len(answer.split("\r\n\r\n", 1)[1].strip()), 10, answer)
-        self.assert_no_tick_is_missing(rig, rig.end(), {0.7281})
+        self.assert_no_tick_is_missing(rig, rig.end(), [0.7281])
 
     def test_malformed_requests_crowds_and_deaf_viewers_do_not_slow_it(self):
         rig = Served(self.folder)
@@ -151,7 +153,7 @@ class Attacked(unittest.TestCase):
         out = rig.end()
         for connection in held:
             connection.close()
-        self.assert_no_tick_is_missing(rig, out, {0.7281, 0.6})
+        self.assert_no_tick_is_missing(rig, out, [0.7281, 0.6])
 
     def test_a_wrong_token_opens_nothing(self):
         rig = Served(self.folder, "--token", TOKEN)
@@ -162,7 +164,7 @@ class Attacked(unittest.TestCase):
         self.assertRegex(rig.post(own, "X-Shiftrig-Token: guess"), r"^HTTP/1\.1 403 ")
         self.assertRegex(rig.post(own, "X-Shiftrig-Token: " + TOKEN, "Origin: http://evil.example"), r"^HTTP/1\.1 403 ")
         self.assertRegex(rig.ask(rig.head("GET /api/model?token=%s HTTP/1.1" % TOKEN)), r"^HTTP/1\.1 200 ")
-        self.assert_no_tick_is_missing(rig, rig.end(), {0.7281})
+        self.assert_no_tick_is_missing(rig, rig.end(), [0.7281])
 
 
 if __name__ == "__main__":
