@@ -108,7 +108,9 @@ Setup complete(const Choices& choices, Setup setup) {
 
 }  // namespace
 
-std::string shipped_calibration() { return SHIFTRIG_CONFIG "/calibration/tractor.yaml"; }
+std::string shipped_calibration() {
+    return SHIFTRIG_CONFIG "/calibration/tractor.yaml";
+}
 
 Setup make_setup(const Choices& choices) {
     Setup setup;

@@ -134,7 +134,8 @@ TEST(Rig, SameRunTwiceLeavesTheSameBits) {
 
 // Ticks that build a mode are the longest of a run by far.
 TEST(Rig, AfterARehearsalNoTickBuildsAModeAndNoBitIsAnother) {
-    Rig plain(make_setup({}, scenario("plough_upshift"))), rehearsed(make_setup({}, scenario("plough_upshift")));
+    Rig plain(make_setup({}, scenario("plough_upshift"))),
+        rehearsed(make_setup({}, scenario("plough_upshift")));
     EXPECT_EQ(rehearse(rehearsed, 60'000), 6000);
     int built = 0, built_after_rehearsal = 0;
     for (int i = 0; i < 6000; ++i) {
@@ -152,7 +153,8 @@ TEST(Rig, ControllerElsewhereIsRehearsedWithTheShippedOne) {
     Choices nobody;
     nobody.buses = {"inprocess"};
     nobody.controller = "none";
-    Rig rig(make_setup(nobody, scenario("plough_upshift"))), commanded(make_setup({}, scenario("plough_upshift")));
+    Rig rig(make_setup(nobody, scenario("plough_upshift"))),
+        commanded(make_setup({}, scenario("plough_upshift")));
     EXPECT_EQ(rehearse(rig, 60'000), 6000);
     commanded.take_modes_of(rig);
     int built = 0;
