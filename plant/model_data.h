@@ -11,6 +11,7 @@
 #include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/lag.h"
+#include "plant/math/table.h"
 #include "plant/plant.h"
 #include "plant/state_layout.h"
 #include "plant/structure.h"
@@ -38,20 +39,26 @@ struct PairLaw {
     HeatOperator heat_operator;
 };
 
+// Where a law acts on a mass: as f[force], with −slip[force] as the speed of the mass.
 struct TyreLaw {
     int wheel = -1, body = -1, mobility = -1;
+    int wheel_force = -1, body_force = -1;
     int resistance = -1;  // friction pair of the body
 };
 struct ConverterLaw {
     int pump = -1, turbine = -1;
+    int pump_force = -1, turbine_force = -1;
 };
 struct EngineLaw {
     int mass = -1, pair = -1;
+    int force = -1;
     double peak = 0;  // of the full-load curve [Nm]
+    Curve full_load;
     int start = -1, speed_request_enable = -1, speed_request = -1, torque_limit = -1, fuel_cut = -1;
 };
 struct SourceLaw {
     int mass = -1, input = -1;
+    int force = -1;
 };
 struct SensorLaw {
     int mass = -1;
@@ -77,7 +84,9 @@ struct ModelData {
     int forces = 0;                       // m
     int first_external = 0;               // where bearing friction ends in f
     int columns = 0;                      // states + m, at most what an operator multiplies
-    int seen = 0;                         // what a view shows: z, slips of forces, meshes, shafts, dampers
+    // What a view shows: slips of forces; from `law_rows` on those of meshes, shafts and dampers; from `power_rows` on z.
+    // Both are whole panels, so that the first part alone (force laws), or the first two (powers), are products too.
+    int law_rows = 0, power_rows = 0, seen = 0;
     int torques = 0;                      // unknowns: pairs, meshes, losses of stuck meshes
     int auxiliary = 0;                    // tyre slips, engine torque and boost
     int contact_bytes = 0;                // pairs + meshes
@@ -86,6 +95,7 @@ struct ModelData {
     std::vector<std::array<Link, 2>> pair_slip, mesh_motion, mesh_loss, shaft_rate, damper_rate, force_on;
     std::vector<std::array<Link, 3>> mesh_slip;
     std::vector<unsigned char> lossy;     // per mesh
+    std::vector<int> lossy_meshes;
     std::vector<double> loss_kink;        // torque at which the loss lines of both directions cross, moving forward [Nm]
     bool depends_on_time = false;         // waveforms: forces are no function of state and inputs alone
     std::vector<int> bearing_force;       // per mesh, −1: none
@@ -93,16 +103,21 @@ struct ModelData {
     double noteworthy_torque = 0;         // 1 % of the weakest clutch: less is idling [Nm]
     std::vector<double> root_inertia;     // √J
     std::vector<double> energy_factor;    // by state: J/2, then k/2
-    std::vector<int> translating;         // masses
+    std::vector<int> translating, translating_force;  // masses
+    std::vector<double> swing_damping;    // of shafts, then dampers
+    std::vector<double> static_factor, sliding_at_rest;  // per pair: of its load [1]
     std::unique_ptr<TreeTopology> tree;   // of the engine for long chains; none: dense modes
 
     std::vector<PairLaw> pair_laws;
+    std::vector<int> hydraulic_pairs, pedal_pairs, waveform_pairs;  // by what actuates them
+    std::vector<int> heated_pairs;
+    int actuated_pairs = 0;               // pairs before those that are loaded by nature (rolling, resistance, engine)
     std::vector<TyreLaw> tyres;
     std::vector<ConverterLaw> converters;
     std::vector<EngineLaw> engines;
     std::vector<SourceLaw> sources;
-    std::vector<int> road_mass;           // per road
-    std::vector<int> plough_mass, plough_pair;  // per plough: body, its resistance
+    std::vector<int> road_mass, road_force;  // per road
+    std::vector<int> plough_mass, plough_force, plough_pair;  // per plough: body, its force, its resistance
     std::vector<SensorLaw> sensors;
     std::vector<double> breakpoints;      // of all waveforms, sorted [s]
 

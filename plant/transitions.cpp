@@ -222,8 +222,8 @@ double reduced_motion(const Work& w, const Mode& mode, const Links& links, doubl
 // How every device would turn with mesh `leader`: ±1, or 0. Geometry of the mode alone, so it is found once.
 void relate(Work& w, const Mode& mode, int leader, signed char* relation) {
     const ModelData& m = w.model;
-    double* lead = w.scratch.vector_a.data();
-    double* member = w.scratch.vector_b.data();
+    double* lead = w.scratch.vector_a;
+    double* member = w.scratch.vector_b;
     const double mobility = mode.family_mobility[leader] = reduced_motion(w, mode, mesh_of(w, leader).motion(), lead);
     const auto related = [&](const std::array<Link, 2>& links) -> signed char {
         const double size = mobility > 0 ? reduced_motion(w, mode, links, member) : 0;
@@ -271,7 +271,7 @@ double release_drive(Work& w, const Mode& mode, int leader, Sample& s) {
     unsigned char* trial = scratch.trial.data();
     std::copy(s.torque, s.torque + m.torques, scratch.torque_copy.data());
     // To set it moving, the load must overcome what its pairs can hold, not what they pass on sliding.
-    double* sliding = scratch.vector_a.data();
+    double* sliding = scratch.vector_a;
     std::copy(s.sliding, s.sliding + m.pairs, sliding);
     for (int k = 0; k < m.pairs; ++k) {
         if (part[k] != 0) s.sliding[k] = std::max(s.sliding[k], s.holding[k]);
@@ -452,8 +452,8 @@ double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
         return energy;
     };
     const double before = kinetic_energy();
-    double* momentum = w.scratch.vector_a.data();
-    double* joined = w.scratch.vector_b.data();
+    double* momentum = w.scratch.vector_a;
+    double* joined = w.scratch.vector_b;
     for (int j = 0; j < m.masses; ++j) momentum[j] = m.structure.inertia[static_cast<std::size_t>(j)] * speeds[j];
     if (mode.tree) {
         tree_mobility(w, mode, momentum, joined);
@@ -472,7 +472,7 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
     const Sample& begin = w.scratch.begin;
     Sample& end = w.scratch.end;
     const double h = end.at.time - begin.at.time;
-    double* change = w.scratch.vector_c.data();  // of the speeds: first as if every mass were free
+    double* change = w.scratch.vector_c;  // of the speeds: first as if every mass were free
     double longest = 0;
     for (int k = 0; k < m.meshes; ++k) {
         unsigned char& state = w.contact[m.pairs + k];
@@ -561,21 +561,34 @@ namespace {
 // Is every state good until the end of the part? The usual answer, quickly; a no only sends us to look closely.
 bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
     const ModelData& m = w.model;
+    // Pairs that slip carry no internal torque, and the slip of locked ones has no sign.
+    double reserve = 0, forward = 0;  // the least of all, 0 if there is some everywhere
     for (int k = 0; k < m.pairs; ++k) {
-        const unsigned char state = w.contact[k];
-        if (state == locked ? std::fabs(end.torque[k]) > end.holding[k] : slip_sign(state) * end.slip[k] < 0) return false;
+        reserve = std::min(reserve, end.holding[k] - std::fabs(end.torque[k]));
+        forward = std::min(forward, slip_sign(w.contact[k]) * end.slip[k]);
     }
-    for (int k = 0; k < m.meshes; ++k) {
+    if (reserve < 0 || forward < 0) return false;
+    if (mode.rests) return false;
+    double moving = 0, driving = 0;
+    for (const int k : m.lossy_meshes) {
         const unsigned char state = w.contact[m.pairs + k];
-        if (!m.lossy[static_cast<std::size_t>(k)]) continue;
-        if (state == stuck || mode.bound[m.pairs + k]) return false;
-        if (motion_sign(state) * slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z) < 0) return false;
-        if (turning_margin(w, m.pairs + k, end) < 0) return false;
+        const double sign = motion_sign(state), x = loss_exponent(state);
+        const double slip = slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z);
+        moving = std::min(moving, sign * slip);
+        driving = std::min(driving, (end.torque[m.pairs + k] - loss_kink(w, k, sign)) * (sign * x));
     }
-    return true;
+    return !(moving < 0 || driving < 0);
 }
 
 }  // namespace
+
+// What holds half way, and the internal torques there: a stage knows neither. Its coordinates (on a tree, everything but
+// the torques) are there.
+static void complete_half(Work& w, const Mode& mode) {
+    if (mode.tree) return internal_torques(w, mode, w.scratch.half);
+    evaluate_forces(w, w.contact, w.scratch.half);
+    active_torques(w.model, mode, w.scratch.half);
+}
 
 Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
@@ -587,7 +600,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         if (!violated(w, mode, k, end)) continue;
         double theta;
         if (k < m.pairs && w.contact[k] == locked) {
-            if (!middle_known) internal_torques(w, mode, w.scratch.half);
+            if (!middle_known) complete_half(w, mode);
             middle_known = true;
             const double g0 = margin(w, k, begin), gm = margin(w, k, w.scratch.half), g1 = margin(w, k, end);
             theta = g0 <= 0 ? 0 : parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
@@ -620,7 +633,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         if (mode.tree) continue;
         if (size == 0) size = torque_scale(w, end);
         if (g1 * loss_difference(mesh_of(w, k - m.pairs)) >= -small * size) continue;
-        if (!middle_known) internal_torques(w, mode, w.scratch.half);
+        if (!middle_known) complete_half(w, mode);
         middle_known = true;
         const double g0 = turning_margin(w, k, begin), gm = turning_margin(w, k, w.scratch.half);
         if (g0 <= 0) continue;  // just turned: it is within rounding of the point where both losses agree
