@@ -7,10 +7,6 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-double input(const Work& w, int index) noexcept {
-    return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)];
-}
-
 StepValues complement(const StepValues& y) noexcept {
     return {1 - y.begin, 1 - y.middle, 1 - y.end};
 }

@@ -58,10 +58,6 @@ void reset(Outputs& outputs, ScratchData& scratch) {
     scratch.begin_groups = nullptr;
 }
 
-double input(const Work& w, int index) {
-    return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)];
-}
-
 void advance_temperatures(Work& w) {
     const ModelData& m = w.model;
     const double oil = input(w, m.oil_temperature), per_step = 1 / w.h;

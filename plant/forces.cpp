@@ -11,10 +11,6 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-double input(const Work& w, int index) noexcept {
-    return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)];
-}
-
 // Viscous drag of an open wet clutch.
 double open_drag(const Work& w, int k, const Sample& s) noexcept {
     return drag_torque(w.model.pair_laws[static_cast<std::size_t>(k)].drag, w.operators.oil.viscosity,

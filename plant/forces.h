@@ -68,6 +68,11 @@ void show(const ModelData& model, const Mode& mode, const double* coordinates, S
 // The same from the sample's own z, which comes to lie on the constraints of the mode.
 void look(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
+// An input as it acts; 0 where the model has none.
+inline double input(const Work& work, int index) noexcept {
+    return index < 0 ? 0 : work.operators.input[static_cast<std::size_t>(index)];
+}
+
 // What a pair or a mesh slips at: A_kᵀω.
 inline double slip_of(const std::array<Link, 2>& links, const double* speeds) noexcept {
     double slip = links[0].factor * speeds[links[0].mass];
