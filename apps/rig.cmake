@@ -7,6 +7,7 @@ add_library(shiftrig_rig STATIC
   ${CMAKE_CURRENT_LIST_DIR}/rig/collector.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/events.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/fork.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/rig/rehearsal.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/rig.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/safe_command.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/scenario_run.cpp

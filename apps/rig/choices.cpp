@@ -12,8 +12,6 @@ namespace shiftrig::rig {
 
 namespace {
 
-constexpr const char* shipped_calibration = SHIFTRIG_CONFIG "/calibration/tractor.yaml";
-
 // The stanza `controller:` of a scenario: `none`, or a map {calibration: FILE, silent: [{from_s, until_s}]}.
 struct ScenarioController {
     bool none = false;
@@ -85,7 +83,7 @@ void choose_controller(const Choices& choices, Setup& setup) {
     buses.silences = scripted.silences;
     if (!is_built_in(controller)) return;
     const std::string given = controller.size() > 8 ? controller.substr(8) : scripted.calibration;
-    buses.calibration_path = given.empty() ? shipped_calibration : given;
+    buses.calibration_path = given.empty() ? shipped_calibration() : given;
     buses.built_in = tcu::read_calibration(buses.calibration_path);
 }
 
@@ -109,6 +107,10 @@ Setup complete(const Choices& choices, Setup setup) {
 }
 
 }  // namespace
+
+std::string shipped_calibration() {
+    return SHIFTRIG_CONFIG "/calibration/tractor.yaml";
+}
 
 Setup make_setup(const Choices& choices) {
     Setup setup;

@@ -25,6 +25,9 @@ Setup make_setup(const Choices& choices);
 // The same for a scenario in memory (choices.scenario is not looked at).
 Setup make_setup(const Choices& choices, io::ScenarioFile scenario);
 
+// The calibration of the built-in controller where nobody names another: a file.
+std::string shipped_calibration();
+
 // The command to be started as the controller; empty if it is none, or built in.
 std::string controller_command(const Choices& choices);
 

@@ -99,6 +99,9 @@ class Rig {
     // The same machine with other parameters, from the next tick on; not while the loop runs. Throws InputError, and
     // std::invalid_argument where the parameter changes what the state is made of (a dead time).
     void change_machine(io::ModelFile model);
+    // The modes that a rig of the same machine and step size has met are this one's too; not while the loop runs. Changes no
+    // bit of what follows but the count of modes built.
+    void take_modes_of(Rig& twin) noexcept { std::swap(operators_, twin.operators_); }
     // From the loop: how late the last tick was (overruns so far), and its compute time over the period.
     void report_timing(std::int64_t overruns, double load) SHIFTRIG_REALTIME;
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "apps/rig/rehearsal.h"
+
 namespace shiftrig::cli {
 
 void RigOptions::add_to(CLI::App& app) {
@@ -30,6 +32,11 @@ void RigOptions::add_common_to(CLI::App& app, const std::string& usual_pace) {
     app.add_option("--when-late", when_late, "what happens then")->check(CLI::IsMember({"record", "skip", "abort"}))->capture_default_str();
     app.add_option("--answer-timeout", answer_timeout_s, "lockstep: seconds to wait for an answer")->check(CLI::PositiveNumber)->capture_default_str();
     app.add_option("--priority", priority, "wall pace: FIFO priority of the plant thread; 0: none")->check(CLI::Range(0, 99))->capture_default_str();
+    app.add_option("--rehearse", rehearsal,
+                   "wall pace: ticks of the scenario that are lived through before the start, so that what is built when a "
+                   "mode is first met is there; 0: none")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
     app.add_option("--cpu", processors, "processors the plant thread may run on");
 }
 
@@ -50,6 +57,10 @@ rt::LoopSettings RigOptions::loop(const rig::Setup& setup) const {
     const double duration = duration_s.value_or(setup.scenario ? setup.scenario->duration : 0);
     if (duration > 0) settings.slots = std::llround(duration * 1e9 / static_cast<double>(setup.tick_ns));
     return settings;
+}
+
+void rehearse(const RigOptions& options, rig::Rig& rig) {
+    if (options.pacing() == rt::Pace::wall) rig::rehearse(rig, options.rehearsal);
 }
 
 rt::Refusals prepare_process(const RigOptions& options, rt::AwakeProcessors& awake) {

@@ -23,6 +23,7 @@ struct RigOptions {
     double answer_timeout_s = 1;        // lockstep
     int priority = 80;                  // FIFO; 0: none
     std::vector<int> processors;
+    std::int64_t rehearsal = 60'000;    // [ticks] at most; 0: none
 
     void add_to(CLI::App& app);
     // Everything but MODEL, --scenario and --duration, for commands that bring those themselves.
@@ -31,6 +32,9 @@ struct RigOptions {
     rt::LoopSettings loop(const rig::Setup& setup) const;
     rt::Pace pacing() const;
 };
+
+// Before a wall-paced loop: see apps/rig/rehearsal.h. Nothing in other paces.
+void rehearse(const RigOptions& options, rig::Rig& rig);
 
 // What a wall-paced loop asks of the machine, for the process and for the calling thread. Nothing in other paces.
 rt::Refusals prepare_process(const RigOptions& options, rt::AwakeProcessors& awake);

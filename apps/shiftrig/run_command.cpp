@@ -190,6 +190,7 @@ int run(const RunOptions& options) {
     rig::Rig& rig = *owned;
     for (const auto& warning : rig.buses().warnings()) std::cerr << warning << '\n';
 
+    rehearse(options, rig);
     rt::AwakeProcessors awake;
     rt::Refusals refusals = prepare_process(options, awake);
     // What the plant thread will not be granted is asked for in advance, so that the recording can begin with it.

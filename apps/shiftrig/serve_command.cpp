@@ -32,6 +32,7 @@ int run(const Options& options) {
     choices.lockstep = options.pacing() == rt::Pace::lockstep;
     rig::Rig rig(rig::make_setup(choices));
     for (const auto& warning : rig.buses().warnings()) std::cerr << warning << '\n';
+    rehearse(options, rig);
 
     serve::DashboardOptions dashboard_options;
     dashboard_options.http = options.http;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "apps/rig/choices.h"
+#include "apps/rig/rehearsal.h"
 #include "apps/rig/scenario_run.h"
 
 namespace shiftrig::rig {
@@ -128,6 +130,46 @@ TEST(Rig, SameRunTwiceLeavesTheSameBits) {
         if (one.run.columns[c].signal.name == "rig.tick_load") continue;  // what the machine took
         EXPECT_EQ(one.run.columns[c].value, other.run.columns[c].value) << one.run.columns[c].signal.name;
     }
+}
+
+// Ticks that build a mode are the longest of a run by far.
+TEST(Rig, AfterARehearsalNoTickBuildsAModeAndNoBitIsAnother) {
+    Rig plain(make_setup({}, scenario("plough_upshift"))),
+        rehearsed(make_setup({}, scenario("plough_upshift")));
+    EXPECT_EQ(rehearse(rehearsed, 60'000), 6000);
+    int built = 0, built_after_rehearsal = 0;
+    for (int i = 0; i < 6000; ++i) {
+        plain.tick();
+        rehearsed.tick();
+        built += plain.certificate().mode_misses;
+        built_after_rehearsal += rehearsed.certificate().mode_misses;
+        ASSERT_TRUE(std::ranges::equal(plain.state().bytes(), rehearsed.state().bytes())) << "tick " << i;
+    }
+    EXPECT_GT(built, 3);
+    EXPECT_EQ(built_after_rehearsal, 0);
+}
+
+TEST(Rig, ControllerElsewhereIsRehearsedWithTheShippedOne) {
+    Choices nobody;
+    nobody.buses = {"inprocess"};
+    nobody.controller = "none";
+    Rig rig(make_setup(nobody, scenario("plough_upshift"))),
+        commanded(make_setup({}, scenario("plough_upshift")));
+    EXPECT_EQ(rehearse(rig, 60'000), 6000);
+    commanded.take_modes_of(rig);
+    int built = 0;
+    for (int i = 0; i < 6000; ++i) {
+        commanded.tick();
+        built += commanded.certificate().mode_misses;
+    }
+    EXPECT_EQ(built, 0);
+}
+
+TEST(Rig, WithoutAScenarioNothingIsRehearsed) {
+    Choices choices;
+    choices.model = config + "tractor.yaml";
+    Rig rig(make_setup(choices));
+    EXPECT_EQ(rehearse(rig, 60'000), 0);
 }
 
 TEST(Rig, LockstepInOneProcessIsTheFreeRunBitForBit) {
