@@ -84,6 +84,7 @@ struct ScratchData {
     int moving_count = 0;
     std::vector<EngineMode> engine_modes;  // at the beginning of the step
     std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
+    std::vector<unsigned char> overcome;  // per pair: broke away in the instant being settled
     std::vector<signed char> family;
     std::vector<double> vector_a, vector_b, vector_c;  // padded masses, torques, forces, or three blocks
     std::vector<double> torque_copy;
