@@ -85,6 +85,7 @@ struct ScratchData {
     int sliding_count = 0, dragging_count = 0;
     std::vector<EngineMode> engine_modes;                                    // at the beginning of the step
     std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
+    std::vector<unsigned char> overcome;  // per pair: broke away in the instant being settled
     std::vector<signed char> family;
     AlignedDoubles vectors;
     double *vector_a = nullptr, *vector_b = nullptr,

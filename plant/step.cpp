@@ -109,6 +109,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     Mode* mode = &begin_mode(w);
 
     double length = 1;  // of a part, at most
+    int leans = m.description.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
     const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.description.maximum_parts : 1);
     for (double done = 0; done < 1;) {
         // Advance over what is left, up to the next jump of a law; in halves where that is too much at once.
@@ -126,7 +127,8 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         const bool inside =
             first.device >= 0 && localise && outputs.certificate.events < m.description.maximum_events;
         double reached = until;
-        if (inside && first.theta * (until - done) < instant) {
+        // What a mesh does by itself it does only beyond its limit: there is always a little way to go.
+        if (inside && first.change == Change::state && first.theta * (until - done) < instant) {
             reached = done;
         } else if (inside && first.theta < 1 - instant) {
             reached = approach(w, *mode, first, done, until);
@@ -143,10 +145,10 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
         // The new state acts from here on; where events are used up, or by choice, from the next step on.
         if (inside) {
-            if (first.change == Change::state) change_state(w, first.device, s.begin);
-            ++outputs.certificate.events;
-        } else if (first.device >= 0 && first.change == Change::state) {
-            change_all(w, *mode, s.begin);
+            const bool moves = first.change != Change::state || change_state(w, first.device, s.begin);
+            if (moves || --leans < 0) ++outputs.certificate.events;
+        } else if (first.device >= 0 && first.change != Change::turn) {
+            if (first.change == Change::state) change_all(w, *mode, s.begin);
             outputs.certificate.fall_backs += localise;
         }
         if (done < 1 || first.device >= 0) {

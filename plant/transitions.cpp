@@ -160,6 +160,7 @@ void open(Work& w, const Mode& mode, int pair, Sample& s) {
     }
     log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], s.holding[pair], 0);
     w.contact[pair] = slipping(s.torque[pair]);
+    w.scratch.overcome[static_cast<std::size_t>(pair)] = !mode.tree;
     contact_forces(w, w.contact, s);
 }
 
@@ -270,11 +271,13 @@ double release_drive(Work& w, const Mode& mode, int leader, Sample& s) {
     const double threshold = 1e-10 * torque_scale(w, s) * mobility * mobility;
     unsigned char* trial = scratch.trial.data();
     std::copy(s.torque, s.torque + m.torques, scratch.torque_copy.data());
-    // To set it moving, the load must overcome what its pairs can hold, not what they pass on sliding.
+    // To set it moving, the load must overcome what its pairs can hold, not what they pass on sliding; but a pair that
+    // breaks away in this very instant has been overcome.
     double* sliding = scratch.vector_a;
     std::copy(s.sliding, s.sliding + m.pairs, sliding);
     for (int k = 0; k < m.pairs; ++k) {
-        if (part[k] != 0) s.sliding[k] = std::max(s.sliding[k], s.holding[k]);
+        if (part[k] != 0 && !scratch.overcome[static_cast<std::size_t>(k)])
+            s.sliding[k] = std::max(s.sliding[k], s.holding[k]);
     }
     const auto set = [&](int k, double sign) {
         const int x = scratch.torque_copy[static_cast<std::size_t>(k)] * sign < 0 ? -1 : 1;
@@ -526,6 +529,7 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
             }
         }
         if (w.scratch.told_events < w.outputs.event_count) tell_closings(w, s);
+        std::fill(w.scratch.overcome.begin(), w.scratch.overcome.end(), static_cast<unsigned char>(0));
         return mode;
     }
 }
@@ -643,13 +647,15 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
     return first;
 }
 
-void change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
+bool change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
     if (device < w.model.pairs && w.contact[device] == locked) {
         const Mode& mode = find_mode(w.model, w.operators, w.contact, w.scratch);
-        if (!lean_on_losses(w, mode, most_used(w, s).share, s)) open(w, mode, device, s);
+        if (lean_on_losses(w, mode, most_used(w, s).share, s)) return false;
+        open(w, mode, device, s);
     } else {
         close(w, device, s);
     }
+    return true;
 }
 
 void change_all(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {

@@ -32,8 +32,9 @@ Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end
 // beyond the point where both losses of a mesh agree, what a stuck mesh lacks to go. Negative: behind it.
 double crossing_margin(Work& work, const Mode& mode, const Crossing& crossing, Sample& sample) SHIFTRIG_REALTIME;
 
-// Changes the state of one device at the sample, and with it of all that its closing brings to rest.
-void change_state(Work& work, int device, Sample& sample) SHIFTRIG_REALTIME;
+// Changes the state of one device at the sample, and with it of all that its closing brings to rest. False: a mesh at
+// rest takes over what is too much for it, and nothing begins to move.
+bool change_state(Work& work, int device, Sample& sample) SHIFTRIG_REALTIME;
 
 // The article's next-step rule: every device whose state did not hold changes at the end of the step.
 void change_all(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;

@@ -36,6 +36,8 @@ struct Response {
     int redundancy = 0;      // dependent rows among meshes and held friction devices
     bool sound =
         true;  // held meshes are independent of everything else that is held: their loss torque is unique
+    // Where not: changes of the torques that no mass feels, one a column.
+    Matrix mesh_freedom, loss_freedom, friction_freedom;
 };
 
 class Responses {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/plant/reference/linear_program.h"
+
 namespace shiftrig::reference {
 namespace {
 
@@ -65,6 +67,65 @@ void Solver::solve(When when, const Vector& state, const Mode& trial, Torques& o
     out.mesh = response.mesh_torque * out.free;
     out.loss = response.loss_torque * out.free;
     out.friction = response.friction_torque * out.free;
+    if (response.friction_freedom.cols() > 0) share(when, state, trial, response, out);
+}
+
+void Solver::share(When when, const Vector& state, const Mode& trial, const Response& response, Torques& out) {
+    // Unknowns: the use u of capacities, and how much of each change, forwards and backwards. The limits of a mesh at
+    // rest, −f(−M) ≤ L ≤ f(M), f the larger of two lines, are one linear program for each choice of lines.
+    const Eigen::Index ways = response.friction_freedom.cols(), unknowns = 1 + 2 * ways;
+    std::vector<std::size_t> held_meshes, held_frictions;
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m)
+        if (system_.meshes[m].lossy() && trial.mesh[m] == Hold::held) held_meshes.push_back(m);
+    for (std::size_t f = 0; f < system_.frictions.size(); ++f)
+        if (trial.friction[f] == Hold::held) held_frictions.push_back(f);
+    const double scale = out.free.lpNorm<Eigen::Infinity>() + 1e-6;
+    const auto rows = static_cast<Eigen::Index>(2 * held_frictions.size() + 2 * held_meshes.size());
+    Matrix a = Matrix::Zero(rows, unknowns);
+    Vector b(rows), cost = Vector::Zero(unknowns), x;
+    cost[0] = 1;
+    Eigen::Index row = 0;
+    const auto limit = [&](const Eigen::RowVectorXd& change, double use, double room) {
+        a.row(row).setZero();
+        a(row, 0) = -use / scale;
+        a.row(row).segment(1, ways) = change;
+        a.row(row).segment(1 + ways, ways) = -change;
+        b[row++] = room / scale;
+    };
+    for (const std::size_t f : held_frictions) {
+        const auto k = static_cast<Eigen::Index>(f);
+        const double holding = system_.frictions[f].holding(when, state);
+        limit(response.friction_freedom.row(k), holding, -out.friction[k]);
+        limit(-response.friction_freedom.row(k), holding, out.friction[k]);
+    }
+    const Eigen::Index first_mesh_row = row;
+    const int branches = 1 << (2 * held_meshes.size());
+    double best = std::numeric_limits<double>::infinity();
+    Vector best_change;
+    int& last = branch_[&response];
+    for (int i = 0; i < branches && best > 1; ++i) {
+        const int branch = i == 0 ? last : i - (i <= last);
+        row = first_mesh_row;
+        for (std::size_t j = 0; j < held_meshes.size(); ++j) {
+            const auto& mesh = system_.meshes[held_meshes[j]];
+            const auto k = static_cast<Eigen::Index>(held_meshes[j]);
+            const int above = (branch >> (2 * j)) & 1 ? -1 : 1, below = (branch >> (2 * j + 1)) & 1 ? -1 : 1;
+            const double rise = mesh.slope(above), fall = mesh.slope(below);
+            limit(response.loss_freedom.row(k) - rise * response.mesh_freedom.row(k), 0,
+                  rise * out.mesh[k] + mesh.offset(above) - out.loss[k]);
+            limit(-response.loss_freedom.row(k) + fall * response.mesh_freedom.row(k), 0,
+                  out.loss[k] - fall * out.mesh[k] + mesh.offset(below));
+        }
+        if (!linear_program(a, b, cost, x) || x[0] >= best) continue;
+        best = x[0];
+        best_change = x.segment(1, ways) - x.segment(1 + ways, ways);
+        last = branch;
+    }
+    if (best_change.size() == 0) return;
+    best_change *= scale;
+    out.mesh += response.mesh_freedom * best_change;
+    out.loss += response.loss_freedom * best_change;
+    out.friction += response.friction_freedom * best_change;
 }
 
 void Solver::rates(When when, const Vector& state, Vector& dz) {

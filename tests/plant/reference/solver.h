@@ -67,6 +67,9 @@ class Solver {
     };
     void solve(When when, const Vector& state, const Mode& trial, Torques& out);
     void free_torque(When when, const Vector& state, const Mode& trial, Vector& out);
+    // Among the splits that no mass feels, one within what meshes at rest can lose that loads held friction devices
+    // least for their capacity. What is at rest stays so as long as some split is within all limits.
+    void share(When when, const Vector& state, const Mode& trial, const Response& response, Torques& torques);
     bool settle_meshes(When when);
     bool consistent(const Mode& trial, const Torques& torques);
     double worst_overload(When when, const Torques& torques, const Mode& trial, int* which);
@@ -91,6 +94,7 @@ class Solver {
     Responses responses_;
     Torques work_;
     Energy energy_;
+    std::map<const Response*, int> branch_;  // of share(): the one that worked last
     Vector force_, extra_, k1_, k2_, k3_, k4_, stage_, margins_;
 };
 
