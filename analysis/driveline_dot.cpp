@@ -22,7 +22,9 @@ const char* shape(Kind kind) {
         case Kind::mass:
             return "box";
         case Kind::clutch:
+        case Kind::freewheel:
         case Kind::brake:
+        case Kind::sprag:
             return "parallelogram";
         case Kind::gear:
             return "circle";

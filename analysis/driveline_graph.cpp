@@ -39,6 +39,9 @@ class Builder {
                    : clutch.radius > 0 ? Kind::tyre
                                        : Kind::clutch,
                    clutch.name, "", {{clutch.a, ""}, {clutch.b, ""}});
+        for (const auto& freewheel : machine_.freewheels)
+            device(freewheel.b.empty() ? Kind::sprag : Kind::freewheel, freewheel.name,
+                   digits(freewheel.rated_torque) + " Nm", {{freewheel.a, ""}, {freewheel.b, ""}});
         for (const auto& gear : machine_.gears)
             device(Kind::gear, gear.name, "u " + digits(gear.ratio), {{gear.a, ""}, {gear.b, ""}});
         for (const auto& row : machine_.planetaries)

@@ -13,6 +13,7 @@ struct DrivelineGraph {
     enum class Kind {
         mass,
         clutch,
+        freewheel,
         shaft,
         damper,
         gear,
@@ -20,6 +21,7 @@ struct DrivelineGraph {
         tyre,
         converter,
         brake,  // hangs on one mass
+        sprag,  // a freewheel to the housing
         engine,
         source,
         road,

@@ -71,6 +71,9 @@ const char* word(Kind kind) {
             return "mass";
         case Kind::clutch:
             return "clutch";
+        case Kind::freewheel:
+        case Kind::sprag:
+            return "freewheel";
         case Kind::shaft:
             return "shaft";
         case Kind::damper:
@@ -102,6 +105,10 @@ std::string symbol(Kind kind) {
     switch (kind) {
         case Kind::clutch:
             return R"(<path d="M-20 0H-4M-4 -14V14M4 -14V14M4 0H20"/>)";
+        case Kind::freewheel:
+            return R"(<path d="M-20 0H-8M-8 -9V9L8 0ZM8 -9V9M8 0H20"/>)";
+        case Kind::sprag:
+            return R"(<path d="M0 -18V-9M-9 -9H9L0 4ZM-14 4H14M-14 4l-4 6M-5 4l-4 6M4 4l-4 6M13 4l-4 6"/>)";
         case Kind::brake:
             return R"(<path d="M0 -18V-6M-14 -6H14M-14 2H14M-14 2l-4 6M-5 2l-4 6M4 2l-4 6M13 2l-4 6"/>)";
         case Kind::shaft:

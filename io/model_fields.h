@@ -213,6 +213,18 @@ void fields(Fields& f, plant::Clutch& c) {
     f.flag("drag", c.drag, "drag of the oil while open (needs oil)");
 }
 
+template <class Fields>
+void fields(Fields& w, plant::Freewheel& f) {
+    w.link("a", f.a, "first mass");
+    w.link_or_housing("b", f.b, "second mass, or housing: a sprag that holds a on one side");
+    w.choice("blocks", f.blocks,
+             Choices<plant::Sense>{{"forward", plant::Sense::forward}, {"backward", plant::Sense::backward}},
+             "sense of ω_a − ω_b that it does not let go: a cannot run ahead of b [forward], or fall behind");
+    w.number("rated_torque_nm", f.rated_torque, positive, "that it holds in that sense");
+    w.number("sliding_share", f.sliding_share, share, "of the rated torque that is left while it slips overloaded");
+    w.optional_number("drag_torque_nm", f.drag_torque, not_negative, "while overrunning [0]");
+}
+
 // ---- rigid devices -----------------------------------------------------------------------------------
 
 template <class Fields>
@@ -374,7 +386,7 @@ void fields(Fields& f, plant::SpeedSensor& s) {
 
 template <class Fields>
 void fields(Fields& f, GearPathText& g) {
-    f.names("closed", g.closed, "clutches and brakes closed in it");
+    f.names("closed", g.closed, "clutches and brakes closed, freewheels locked in it");
     f.optional_integer("lever", g.lever, any,
                        "position of the lever that asks for it: −1 reverse, 1… forward");
 }
@@ -415,6 +427,7 @@ void fields(Fields& f, ModelText& model) {
     f.section("shafts", "shaft", d.shafts, "elastic shafts with their dampers");
     f.section("dampers", "damper", d.dampers, "between masses or to the housing");
     f.section("clutches", "clutch", d.clutches, "clutches, brakes, Coulomb wheel contacts");
+    f.section("freewheels", "freewheel", d.freewheels, "one-way clutches, sprags");
     f.section("gears", "gear", d.gears, "fixed-axis gears, range groups");
     f.section("planetaries", "planetary row", d.planetaries, "planetary rows");
     f.section("tyres", "tyre", d.tyres, "Brixius traction with relaxation");

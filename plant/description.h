@@ -153,6 +153,18 @@ struct Clutch {
     bool drag = false;             // viscous drag of the open wet clutch, by oil viscosity
 };
 
+// One-way clutch (freewheel, sprag) between a and b, with b empty to the housing; laws/freewheel.h. It does not let
+// ω_a − ω_b go in the sense it blocks: forward, a cannot run ahead of b; backward, a cannot fall behind.
+enum class Sense { forward, backward };
+
+struct Freewheel {
+    std::string name, a, b;
+    Sense blocks = Sense::forward;
+    double rated_torque = 0;   // held in the blocked sense [Nm], > 0
+    double sliding_share = 0;  // of it that is left while the overloaded freewheel slips, in (0, 1]
+    double drag_torque = 0;    // while overrunning [Nm], ≥ 0
+};
+
 // ---- rigid devices -----------------------------------------------------------------------------------
 
 // Fixed-axis gear, u = u12 = ω_a/ω_b; efficiency η acts as û = u·η^x.
@@ -274,6 +286,7 @@ struct Description {
     std::vector<Shaft> shafts;
     std::vector<Damper> dampers;
     std::vector<Clutch> clutches;      // clutches, brakes, Coulomb wheel contacts
+    std::vector<Freewheel> freewheels;
     std::vector<Gear> gears;
     std::vector<Planetary> planetaries;
     std::vector<BrixiusTyre> tyres;

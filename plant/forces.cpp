@@ -39,6 +39,13 @@ void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcep
     }
 }
 
+// Overrunning freewheels pass on their drag only; in the other sense they are pairs like any other.
+void freewheel_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
+    for (const FreewheelLaw& law : w.model.freewheels) {
+        if (slip_sign(contact[law.pair]) * law.sense < 0) s.f[law.pair] = -law.sense * law.drag;
+    }
+}
+
 void bearing_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
     const ModelData& m = w.model;
     if (m.first_external == m.pairs) return;
@@ -161,6 +168,7 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s,
     s.input_power = input_power;
     s.field_power = field_power;
     pair_forces(w, contact, s);
+    freewheel_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }
 
@@ -171,6 +179,7 @@ void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIF
         if (contact[k] == free_running && m.pair_laws[static_cast<std::size_t>(k)].drag > 0)
             s.f[k] = open_drag(w, k, s);
     }
+    freewheel_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }
 

@@ -114,6 +114,14 @@ void build_laws(ModelData& m) {
         PairLaw law;
         switch (pair.kind) {
             case PairKind::clutch: law = clutch_law(m, d.clutches[static_cast<std::size_t>(pair.source)], actuator_slots); break;
+            case PairKind::freewheel: {
+                const Freewheel& f = d.freewheels[static_cast<std::size_t>(pair.source)];
+                law.source = LoadSource::rated;
+                law.full_load = f.rated_torque;
+                law.freewheel = static_cast<int>(m.freewheels.size());
+                m.freewheels.push_back(freewheel_law(f, static_cast<int>(m.pair_laws.size())));
+                break;
+            }
             case PairKind::rolling:
                 law.source = LoadSource::rolling;
                 law.full_load = rolling_moment(d.tyres[static_cast<std::size_t>(pair.source)]);
@@ -122,6 +130,7 @@ void build_laws(ModelData& m) {
             case PairKind::engine_friction: law.source = LoadSource::engine; break;
         }
         if (pair.kind != PairKind::clutch) law.friction.base = law.friction.static_factor = 1;
+        if (law.freewheel >= 0) law.friction.base = d.freewheels[static_cast<std::size_t>(pair.source)].sliding_share;
         if (law.heat) law.temperature = 2 * heated++;
         law.sliding_at_rest = sliding_factor(law.friction, 0);
         if (law.source == LoadSource::waveform) m.depends_on_time = true;
@@ -323,6 +332,14 @@ void build_outputs(ModelData& m) {
         add(prefix + "heat", Unit::joule, "friction heat since start");
         if (m.pair_laws[k].hydraulic) at.pressure[k] = add(prefix + "pressure", Unit::pascal, "chamber pressure");
         if (m.pair_laws[k].heat) at.temperature[k] = add(prefix + "temperature", Unit::celsius, "facing surface");
+    }
+    for (const Freewheel& f : d.freewheels) {
+        const std::string prefix = "freewheel." + f.name + ".";
+        at.freewheel.push_back(add(prefix + "torque", Unit::newton_metre, "torque on the first link"));
+        add(prefix + "slip", Unit::radian_per_second, "slip speed, first link minus second");
+        add(prefix + "state", Unit::one, "0 locked, 1 overloaded, 2 overrunning");
+        add(prefix + "heat_power", Unit::watt, "power of drag or overload");
+        add(prefix + "heat", Unit::joule, "heat of drag and overload since start");
     }
     for (const Mesh& mesh : s.meshes) {
         const std::string prefix = (mesh.planetary ? "row." : "gear.") + mesh.name + ".";

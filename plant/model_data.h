@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "plant/kernels.h"
+#include "plant/laws/freewheel.h"
 #include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/lag.h"
@@ -19,7 +20,7 @@
 namespace shiftrig::plant::detail {
 
 // What presses a friction pair together, and where that comes from.
-enum class LoadSource { constant, waveform, input, release, apply, hydraulic, rolling, resistance, engine };
+enum class LoadSource { constant, waveform, input, release, apply, hydraulic, rolling, resistance, engine, rated };
 
 struct PairLaw {
     LoadSource source{};
@@ -34,6 +35,7 @@ struct PairLaw {
     int delay_slots = 0;       // of a hydraulic actuator
     int command = -1, stuck = -1, valve_stuck = -1, leak = -1;  // inputs
     int temperature = -1;      // offset in the State block
+    int freewheel = -1;        // index into ModelData::freewheels
     const FacingHeat* heat = nullptr;
     HeatOperator heat_operator;
 };
@@ -60,7 +62,7 @@ struct SensorLaw {
 
 // Outputs in groups: index of the first signal of each device.
 struct OutputLayout {
-    std::vector<int> mass, shaft, pair, mesh, tyre, converter, engine, body, plough, sensor;
+    std::vector<int> mass, shaft, pair, freewheel, mesh, tyre, converter, engine, body, plough, sensor;
     std::vector<int> pressure, temperature;  // per pair, −1 if it has none
     int oil = -1, energy = -1, certificate = -1;
 };
@@ -97,6 +99,7 @@ struct ModelData {
     std::unique_ptr<TreeTopology> tree;   // of the engine for long chains; none: dense modes
 
     std::vector<PairLaw> pair_laws;
+    std::vector<FreewheelLaw> freewheels;
     std::vector<TyreLaw> tyres;
     std::vector<ConverterLaw> converters;
     std::vector<EngineLaw> engines;

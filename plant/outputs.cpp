@@ -45,6 +45,14 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
         if (law.hydraulic) put(chamber_pressure(block, law) * w.scratch.loads[i].scale);
         if (law.heat) put(block[law.temperature]);
     }
+    for (const FreewheelLaw& law : m.freewheels) {
+        const int k = law.pair;
+        const unsigned char state = w.contact[k];
+        const double slip = slip_fast(m.pair_slip[static_cast<std::size_t>(k)], speeds);
+        const double torque = state == locked ? s.torque[k] : s.f[k];
+        put(torque, slip, state == locked ? 0. : slip_sign(state) * law.sense > 0 ? 1. : 2.,
+            state == locked ? 0. : torque * slip, block[m.layout.heat + k]);
+    }
     for (int k = 0; k < m.meshes; ++k) {
         const auto i = static_cast<std::size_t>(k);
         const Mesh& mesh = m.structure.meshes[i];

@@ -71,9 +71,10 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
                 double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 4;
     // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
-    // beyond.
-    const bool by_itself = crossing.change != Change::state;
-    const double close_enough = by_itself ? 1e-2 : 1e-5, beyond = by_itself ? 3e-3 : 0;
+    // beyond. So too with a freewheel that lets go at no torque: this side of it, it would only lock again.
+    const bool by_itself = acts_by_itself(crossing.change), overrun = crossing.change == Change::overrun;
+    const double close_enough = by_itself ? 1e-2 : overrun ? 1e-3 : 1e-5;
+    const double beyond = by_itself ? 3e-3 : overrun ? 3e-4 : 0;
     double low = done, high = until;
     const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
     double at_low = left(w.scratch.begin), at_high = left(w.scratch.end);
@@ -143,9 +144,9 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
         // The new state acts from here on; where events are used up, or by choice, from the next step on.
         if (inside) {
-            if (first.change == Change::state) change_state(w, first.device, s.begin);
+            if (!acts_by_itself(first.change)) change_state(w, first.device, s.begin);
             ++outputs.certificate.events;
-        } else if (first.device >= 0 && first.change == Change::state) {
+        } else if (first.device >= 0 && !acts_by_itself(first.change)) {
             change_all(w, *mode, s.begin);
             outputs.certificate.fall_backs += localise;
         }

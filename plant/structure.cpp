@@ -111,6 +111,11 @@ Structure build_structure(const Description& d) {
         s.pairs.push_back({c.name, PairKind::clutch, static_cast<int>(i), {link(c.a, 1), link(c.b, b)},
                            nominal_capacity(c)});
     }
+    for (std::size_t i = 0; i < d.freewheels.size(); ++i) {
+        const Freewheel& f = d.freewheels[i];
+        s.pairs.push_back({f.name, PairKind::freewheel, static_cast<int>(i), {link(f.a, 1), link(f.b, -1)},
+                           f.rated_torque});
+    }
     for (std::size_t i = 0; i < d.tyres.size(); ++i) {
         const BrixiusTyre& t = d.tyres[i];
         if (t.rolling_coefficient <= 0) continue;

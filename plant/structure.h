@@ -8,6 +8,7 @@
 //
 //   | device                        | column of A                                   |
 //   | clutch, shaft, damper a–b     | a: 1, b: −1                                   |
+//   | freewheel a–b                 | a: 1, b: −1                                   |
 //   | brake, damper on a            | a: 1                                          |
 //   | wheel a on a road mass b      | a: 1, b: −1/r                                 |
 //   | gear, u = ω_a/ω_b             | a: 1, b: −u                                   |
@@ -38,6 +39,7 @@ struct Link {
 // themselves, because what resists motion must also be able to hold a body at rest:
 enum class PairKind {
     clutch,           // clutch, brake, Coulomb wheel contact: description.clutches[source]
+    freewheel,        // description.freewheels[source]
     rolling,          // rolling moment on a tyre's wheel: description.tyres[source]
     body_resistance,  // motion resistance and draft on a translating mass: description.masses[source]
     engine_friction,  // of a stalled engine on its mass: description.engines[source]

@@ -135,7 +135,7 @@ bool engage_and_release(Work& w, Sample& s) {
 bool is_overloaded(const Work& w, int pair, const Sample& s) {
     if (pair < 0) return false;
     const double torque = std::fabs(s.torque[pair]);
-    return torque > overload * s.holding[pair] && torque > 1e-11 * torque_scale(w, s);
+    return torque > overload * static_limit(w, pair, s) && torque > 1e-11 * torque_scale(w, s);
 }
 
 // The locked pair that uses most of its static capacity.
@@ -147,10 +147,23 @@ Use most_used(const Work& w, const Sample& s) {
     Use worst;
     for (int k = 0; k < w.model.pairs; ++k) {
         if (w.contact[k] != locked) continue;
-        const double use = std::fabs(s.torque[k]) / s.holding[k];
+        const double use = std::fabs(s.torque[k]) / static_limit(w, k, s);
         if (use > worst.share && (use <= overload || is_overloaded(w, k, s))) worst = {k, use};
     }
     return worst;
+}
+
+// The law of a pair that is a freewheel, else none.
+const FreewheelLaw* freewheel_of(const Work& w, int pair) {
+    const int index = w.model.pair_laws[static_cast<std::size_t>(pair)].freewheel;
+    return index < 0 ? nullptr : &w.model.freewheels[static_cast<std::size_t>(index)];
+}
+
+// The sense in which a locked pair begins to slip: that of its torque. A freewheel that lets go does so at next to none.
+double opening_sense(const Work& w, int pair, double torque) {
+    const FreewheelLaw* law = freewheel_of(w, pair);
+    if (!law) return torque;
+    return is_next_to_overrun(*law, torque) ? -law->sense : law->sense;
 }
 
 // Meshes that leaned on their losses begin anew: which way they go now, release_drive() finds out.
@@ -158,8 +171,8 @@ void open(Work& w, const Mode& mode, int pair, Sample& s) {
     for (int k = w.model.pairs; k < w.model.contact_bytes; ++k) {
         if (mode.bound[k] && mesh_of(w, k - w.model.pairs).lossy()) w.contact[k] = stuck;
     }
-    log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], s.holding[pair], 0);
-    w.contact[pair] = slipping(s.torque[pair]);
+    log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], static_limit(w, pair, s), 0);
+    w.contact[pair] = slipping(opening_sense(w, pair, s.torque[pair]));
     contact_forces(w, w.contact, s);
 }
 
@@ -535,7 +548,10 @@ namespace {
 double margin(const Work& w, int device, const Sample& s) {
     const unsigned char state = w.contact[device];
     if (device >= w.model.pairs) return motion_sign(state) * device_slip(w, device, s.z);
-    if (state == locked) return s.holding[device] - std::fabs(s.torque[device]);
+    if (state == locked) {
+        const FreewheelLaw* law = freewheel_of(w, device);
+        return law ? freewheel_margin(*law, s.torque[device]) : s.holding[device] - std::fabs(s.torque[device]);
+    }
     return slip_sign(state) * device_slip(w, device, s.z);
 }
 
@@ -549,7 +565,8 @@ double turning_margin(const Work& w, int device, const Sample& s) {
 
 double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Sample& s) SHIFTRIG_REALTIME {
     switch (crossing.change) {
-        case Change::state: return margin(w, crossing.device, s);
+        case Change::state:
+        case Change::overrun: return margin(w, crossing.device, s);
         case Change::turn: return turning_margin(w, crossing.device, s);
         case Change::release: return -release_drive(w, mode, crossing.device - w.model.pairs, s);
     }
@@ -575,22 +592,33 @@ bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
     return true;
 }
 
+// What a locked freewheel would have to pass on against its sense, all_hold() does not see.
+bool freewheels_hold(const Work& w, const Sample& end) {
+    for (const FreewheelLaw& law : w.model.freewheels) {
+        if (w.contact[law.pair] == locked && freewheel_margin(law, end.torque[law.pair]) < 0) return false;
+    }
+    return true;
+}
+
 }  // namespace
 
 Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     w.scratch.turned = false;
     Crossing first;
-    if (all_hold(w, mode, end)) return first;
+    if (all_hold(w, mode, end) && freewheels_hold(w, end)) return first;
     bool rates_known = false, middle_known = false;
     for (int k = 0; k < m.contact_bytes; ++k) {
         if (!violated(w, mode, k, end)) continue;
         double theta;
+        Change change = Change::state;
         if (k < m.pairs && w.contact[k] == locked) {
             if (!middle_known) internal_torques(w, mode, w.scratch.half);
             middle_known = true;
             const double g0 = margin(w, k, begin), gm = margin(w, k, w.scratch.half), g1 = margin(w, k, end);
             theta = g0 <= 0 ? 0 : parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
+            const FreewheelLaw* law = freewheel_of(w, k);
+            if (law && is_next_to_overrun(*law, end.torque[k])) change = Change::overrun;
         } else {
             if (!rates_known) sample_rate(w, mode, begin);
             rates_known = true;
@@ -599,7 +627,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
             theta = parabola_root(margin(w, k, begin), sign * device_slip(w, k, begin.rate) * length,
                                   margin(w, k, end));
         }
-        if (first.device < 0 || theta < first.theta) first = {k, theta, Change::state};
+        if (first.device < 0 || theta < first.theta) first = {k, theta, change};
     }
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
         const int leader = mode.rows[r] - m.pairs - m.meshes;

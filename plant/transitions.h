@@ -15,7 +15,13 @@ enum class Change {
     state,    // a pair opens or closes, a mesh comes to rest
     turn,     // the power through a mesh turns round
     release,  // a stuck mesh goes
+    overrun,  // a freewheel lets go
 };
+
+// Once the crossing lies behind, settle() does the rest.
+constexpr bool acts_by_itself(Change change) noexcept {
+    return change == Change::turn || change == Change::release;
+}
 
 struct Crossing {
     int device = -1;   // contact byte: pair or pairs + mesh; −1: nobody changes

@@ -360,6 +360,27 @@ RandomSystem random_system(std::uint64_t seed, double seconds) {
     return Builder(seed, seconds).build();
 }
 
+RandomSystem random_system_with_freewheels(std::uint64_t seed, double seconds) {
+    RandomSystem system = random_system(seed, seconds);
+    Dice dice(seed + 0x5eed);
+    std::vector<Clutch> kept;
+    for (const Clutch& c : system.description.clutches) {
+        if (!dice.chance(0.6)) {
+            kept.push_back(c);
+            continue;
+        }
+        const double capacity = std::get<DryFriction>(c.friction).sliding_capacity;
+        Freewheel f{.name = c.name, .a = c.a, .b = c.b};
+        f.blocks = dice.chance(0.5) ? Sense::forward : Sense::backward;
+        f.rated_torque = capacity * (dice.chance(0.3) ? 1 : 20);
+        f.sliding_share = dice.chance(0.5) ? 1 : dice.uniform(0.6, 1);
+        f.drag_torque = dice.chance(0.5) ? 0 : capacity * dice.logarithmic(1e-3, 0.1);
+        system.description.freewheels.push_back(f);
+    }
+    system.description.clutches = kept;
+    return system;
+}
+
 double impulse(const Waveform& waveform, double until) {
     double sum = 0;
     for (const auto& p : waveform.pieces) {

@@ -111,6 +111,19 @@ System::System(const plant::Description& d) {
         if (const auto* direct = std::get_if<plant::ActuationDirect>(&clutch.actuation))
             collect_breaks(direct->profile, breaks);
     }
+    for (const auto& f : d.freewheels) {
+        Friction friction;
+        friction.name = f.name;
+        friction.column = unit(masses, mass(f.a));
+        if (!f.b.empty()) friction.column -= unit(masses, mass(f.b));
+        friction.nominal = f.rated_torque;
+        friction.sense = f.blocks == plant::Sense::forward ? 1 : -1;
+        friction.drag = f.drag_torque;
+        const double sliding = f.sliding_share * f.rated_torque, holding = f.rated_torque;
+        friction.sliding = [sliding](When, const Vector&, double) { return sliding; };
+        friction.holding = [holding](When, const Vector&) { return holding; };
+        frictions.push_back(friction);
+    }
     const auto add_mesh = [this](const std::string& name, double u, double eta, int one, int two,
                                  int carrier) {
         const Vector housing = Vector::Zero(masses);

@@ -11,6 +11,8 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -38,6 +40,21 @@ struct Friction {
     // Capacities [Nm] ≥ 0; sliding depends on |slip|.
     std::function<double(When, const Vector& z, double slip)> sliding;
     std::function<double(When, const Vector& z)> holding;
+    // A freewheel has these capacities in one sense, ±1, and in the other its drag in place of both.
+    double sense = 0, drag = 0;
+
+    bool is_free_side(double sign) const { return sense * sign < 0; }
+    double slides(When when, const Vector& z, double slip, double sign) const {
+        return is_free_side(sign) ? drag : sliding(when, z, slip);
+    }
+    // What a held device has left of its limit, and the sense in which it begins to slip at this torque.
+    double reserve(When when, const Vector& z, double torque, double tolerance) const {
+        const double limit = holding(when, z) * (1 + tolerance);
+        return sense == 0 ? limit - std::abs(torque) : std::min(limit - sense * torque, drag + sense * torque);
+    }
+    double opens_towards(When when, const Vector& z, double torque) const {
+        return sense == 0 ? torque : drag + sense * torque < holding(when, z) - sense * torque ? -sense : sense;
+    }
 };
 
 struct Mesh {
