@@ -34,6 +34,7 @@ const char* shape(Kind kind) {
         case Kind::converter:
             return "ellipse";
         case Kind::shaft:
+        case Kind::backlash:
         case Kind::damper:
             return "plain";
         case Kind::engine:

@@ -31,6 +31,9 @@ class Builder {
         for (const auto& shaft : machine_.shafts)
             device(Kind::shaft, shaft.name, digits(shaft.stiffness) + " Nm/rad",
                    {{shaft.a, ""}, {shaft.b, ""}});
+        for (const auto& backlash : machine_.backlashes)
+            device(Kind::backlash, backlash.name, digits(1e3 * backlash.gap) + " mrad",
+                   {{backlash.a, ""}, {backlash.b, ""}});
         for (const auto& damper : machine_.dampers)
             device(Kind::damper, damper.name, digits(damper.damping) + " Nm s/rad",
                    {{damper.a, ""}, {damper.b, ""}});

@@ -15,6 +15,7 @@ struct DrivelineGraph {
         clutch,
         freewheel,
         shaft,
+        backlash,
         damper,
         gear,
         planetary,

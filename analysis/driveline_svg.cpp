@@ -76,6 +76,8 @@ const char* word(Kind kind) {
             return "freewheel";
         case Kind::shaft:
             return "shaft";
+        case Kind::backlash:
+            return "backlash";
         case Kind::damper:
             return "damper";
         case Kind::gear:
@@ -113,6 +115,8 @@ std::string symbol(Kind kind) {
             return R"(<path d="M0 -18V-6M-14 -6H14M-14 2H14M-14 2l-4 6M-5 2l-4 6M4 2l-4 6M13 2l-4 6"/>)";
         case Kind::shaft:
             return R"(<path d="M-20 0h4l4 -8 6 16 6 -16 6 16 6 -16 4 8h4"/>)";
+        case Kind::backlash:
+            return R"(<path d="M-20 0H-11M4 -11H-11V11H4M-3 0H20M-3 -6V6"/>)";
         case Kind::damper:
             return R"(<path d="M-20 0H-2M-2 -7V7M-8 -10H8V10H-8M8 0H20"/>)";
         case Kind::gear:

@@ -70,6 +70,16 @@ void fields(Fields& f, plant::Shaft& s) {
 }
 
 template <class Fields>
+void fields(Fields& f, plant::Backlash& b) {
+    f.link("a", b.a, "mass at the first end");
+    f.link("b", b.b, "mass at the second end");
+    f.number("stiffness_nm_per_rad", b.stiffness, positive, "of the closed flanks");
+    f.number("damping_nm_s_per_rad", b.damping, not_negative, "damper parallel to it while they are closed");
+    f.number("gap_rad", b.gap, positive, "the whole play, from flank to flank");
+    f.optional_number("initial_twist_rad", b.initial_twist, any, "at the start, a ahead of b [0: in the middle]");
+}
+
+template <class Fields>
 void fields(Fields& f, plant::Damper& d) {
     f.link("a", d.a, "first mass");
     f.link_or_housing("b", d.b, "second mass, or housing");
@@ -425,6 +435,7 @@ void fields(Fields& f, ModelText& model) {
           "maps that others take in with << and an anchor; not read themselves");
     f.section("masses", "mass", d.masses, "lumped masses; every link of a device ends on one");
     f.section("shafts", "shaft", d.shafts, "elastic shafts with their dampers");
+    f.section("backlashes", "backlash", d.backlashes, "elastic shafts with play");
     f.section("dampers", "damper", d.dampers, "between masses or to the housing");
     f.section("clutches", "clutch", d.clutches, "clutches, brakes, Coulomb wheel contacts");
     f.section("freewheels", "freewheel", d.freewheels, "one-way clutches, sprags");

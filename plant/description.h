@@ -32,6 +32,15 @@ struct Shaft {
     double initial_twist = 0;  // [rad], positive where a is ahead of b
 };
 
+// Elastic shaft with play: within the gap it passes on nothing, laws/backlash.h.
+struct Backlash {
+    std::string name, a, b;
+    double stiffness = 0;      // of the closed flanks [Nm/rad], > 0
+    double damping = 0;        // of the closed flanks [Nm s/rad], ≥ 0
+    double gap = 0;            // the whole play [rad], > 0
+    double initial_twist = 0;  // [rad], positive where a is ahead of b; 0: in the middle of the play
+};
+
 struct Damper {
     std::string name, a, b;  // b empty: to the housing
     double damping = 0;      // [Nm s/rad]
@@ -284,6 +293,7 @@ struct Description {
     std::string name;
     std::vector<Mass> masses;
     std::vector<Shaft> shafts;
+    std::vector<Backlash> backlashes;
     std::vector<Damper> dampers;
     std::vector<Clutch> clutches;      // clutches, brakes, Coulomb wheel contacts
     std::vector<Freewheel> freewheels;
@@ -305,7 +315,7 @@ struct Description {
     Method method = Method::automatic;
     int maximum_events = 4;               // K of numerics.md §4
     // A step is taken in up to this many parts where shafts swing or forces change too fast for one; 1: never.
-    // Bounds the cost of a step.
+    // Bounds the cost of a step. A backlash whose flanks are too stiff for that many raises both bounds (not 1).
     int maximum_parts = 16;
 };
 

@@ -70,6 +70,10 @@ std::string explain(const Model& model, const Event& event) {
         case EventKind::engine_starts: return line + say("runs at %.1f rad/s", event.slip);
         case EventKind::facing_warning: return line + say("facing passes its warning temperature: %.0f degC", event.slip);
         case EventKind::facing_failure: return line + say("facing passes its failure temperature: %.0f degC", event.slip);
+        case EventKind::flank_closes:
+            return line + say("closes its %s flank at %.3f rad/s", event.capacity > 0 ? "forward" : "backward", event.slip);
+        case EventKind::flank_opens:
+            return line + say("opens its %s flank at %.3f rad/s", event.capacity > 0 ? "forward" : "backward", event.slip);
     }
     return line;
 }

@@ -89,7 +89,7 @@ void advance_engine_modes(Work& w) {
         const auto mode = static_cast<EngineMode>(static_cast<int>(at[0]));
         const EngineMode next =
             next_engine_mode(m.description.engines[e], mode, speed, start > 0.5 && at[2] <= 0.5, w.h, at[1]);
-        const int device = m.pairs + m.meshes + static_cast<int>(e);
+        const int device = m.contact_bytes + static_cast<int>(e);
         if (next != mode && next != EngineMode::cranking) {
             const EventKind kind =
                 next == EngineMode::stalled ? EventKind::engine_stalls : EventKind::engine_starts;
@@ -270,7 +270,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     double* old_speeds = s.vector_c.data();
     std::copy(block + layout.speeds, block + layout.speeds + m.masses, old_speeds);
     write_integer(block, read_integer(block) + 1);
-    const double before = stored_energy(m, block + layout.speeds);  // twists follow the speeds
+    const double before = stored_energy(m, block + layout.speeds, s.before.data());  // twists follow the speeds
     std::copy(s.begin.z, s.begin.z + m.states, block + layout.speeds);
     std::copy(s.begin.auxiliary, s.begin.auxiliary + m.auxiliary, block + layout.auxiliary);
     advance_sensors(w, old_speeds);
@@ -280,7 +280,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     block[layout.energy] += s.input_work;
     block[layout.energy + 1] += s.dissipated;
 
-    s.stored = stored_energy(m, s.begin.z);
+    s.stored = stored_energy(m, s.begin.z, w.contact);
     certificate.energy_defect = s.stored - before - s.input_work + s.dissipated;
     certificate.torque_residual = mode.tree ? s.torque_residual : torque_residual(w, mode, s.begin);
     certificate.constraint_violation = constraint_violation(w, mode, s.begin.z);
@@ -299,7 +299,7 @@ void finish_look(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         mode.tree ? w.scratch.torque_residual : torque_residual(w, mode, s);
     w.outputs.certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     w.outputs.event_count = 0;
-    w.scratch.stored = stored_energy(w.model, s.z);
+    w.scratch.stored = stored_energy(w.model, s.z, w.contact);
     fill_outputs(w, mode, s);
 }
 

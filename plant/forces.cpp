@@ -46,6 +46,12 @@ void freewheel_forces(const Work& w, const unsigned char* contact, Sample& s) no
     }
 }
 
+// ∓kδ of closed flanks: their torque is k φ of the mode and this.
+void flank_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
+    for (const BacklashLaw& law : w.model.backlashes)
+        s.f[law.force] = -flank_side(contact[law.device]) * law.stiffness * law.half_gap;
+}
+
 void bearing_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
     const ModelData& m = w.model;
     if (m.first_external == m.pairs) return;
@@ -169,6 +175,7 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s,
     s.field_power = field_power;
     pair_forces(w, contact, s);
     freewheel_forces(w, contact, s);
+    flank_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }
 
@@ -180,6 +187,7 @@ void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIF
             s.f[k] = open_drag(w, k, s);
     }
     freewheel_forces(w, contact, s);
+    flank_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }
 

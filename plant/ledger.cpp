@@ -18,10 +18,14 @@ double mesh_losses(const ModelData& m, const Mode& mode, const Sample& s) {
 }
 
 // Loss in dampers and in the damping of shafts [W].
-double damping_losses(const ModelData& m, const Sample& s) {
+double damping_losses(const ModelData& m, const Mode& mode, const Sample& s) {
     double power = 0;
     const double* swing = s.swing;
-    for (const Elastic& shaft : m.structure.shafts) power += shaft.damping * *swing * *swing, ++swing;
+    int e = 0;
+    for (const Elastic& shaft : m.structure.shafts) {
+        if (is_shaft_closed(m, mode, e++)) power += shaft.damping * *swing * *swing;
+        ++swing;
+    }
     for (const Elastic& damper : m.structure.dampers) power += damper.damping * *swing * *swing, ++swing;
     return power;
 }
@@ -45,7 +49,8 @@ double fill_middle(Work& w, const Mode& mode) {
     middle.at = s.half.at;
     evaluate_forces(w, w.contact, middle, Extent::moving_pairs);
     internal_torques(w, mode, middle);
-    return h / 6 * (damping_losses(m, begin) + 4 * damping_losses(m, middle) + damping_losses(m, end));
+    return h / 6 *
+           (damping_losses(m, mode, begin) + 4 * damping_losses(m, mode, middle) + damping_losses(m, mode, end));
 }
 
 // The parabola through the forces at start, middle and end with which the step was made, at the fraction s.
@@ -83,14 +88,14 @@ void book_finely(Work& w, const Mode& mode) {
         forces_at(s, m.forces, static_cast<double>(part) / parts, at.f);
         const double weight = h / parts / 3 * (part == 0 || part == parts ? 1 : part % 2 ? 4 : 2);  // Simpson
         internal_torques(w, mode, at);
-        double loss = mesh_losses(m, mode, at) + damping_losses(m, at);
+        double loss = mesh_losses(m, mode, at) + damping_losses(m, mode, at);
         for (int k = 0; k < m.pairs; ++k) {
             const double power = at.f[k] * at.slip[k];
             s.heat[static_cast<std::size_t>(k)] += weight * power;
             loss += power;
         }
         s.dissipated += weight * loss;
-        for (int k = m.first_external; k < m.forces; ++k) external_work -= weight * at.f[k] * at.slip[k];
+        for (int k = m.first_external; k < m.first_flank_force; ++k) external_work -= weight * at.f[k] * at.slip[k];
         for (std::size_t i = 0; i < m.translating.size(); ++i) {
             w.next[m.layout.distances + static_cast<int>(i)] += weight * at.z[m.translating[i]];
         }
@@ -121,6 +126,13 @@ double stored_energy(const ModelData& m, const double* z) SHIFTRIG_REALTIME {
     }
     for (int lane = 0; i < m.states; ++i, ++lane) sums[lane] += stored[i] * z[i] * z[i];
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
+
+double stored_energy(const ModelData& m, const double* z, const unsigned char* contact) SHIFTRIG_REALTIME {
+    double energy = stored_energy(m, z);
+    for (const BacklashLaw& law : m.backlashes)
+        energy += flank_energy(law, flank_side(contact[law.device]), z[m.masses + law.shaft]);
+    return energy;
 }
 
 void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {

@@ -25,7 +25,7 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
     const auto put = [&next](auto... values) { ((*next++ = values), ...); };
 
     for (int j = 0; j < m.masses; ++j) put(speeds[j]);
-    for (std::size_t e = 0; e < m.shaft_rate.size(); ++e) {
+    for (std::size_t e = 0; e < static_cast<std::size_t>(m.plain_shafts); ++e) {
         const Elastic& shaft = m.structure.shafts[e];
         const double twist = speeds[static_cast<std::size_t>(m.masses) + e];
         put(shaft.stiffness * twist + shaft.damping * slip_fast(m.shaft_rate[e], speeds), twist);
@@ -52,6 +52,11 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
         const double torque = state == locked ? s.torque[k] : s.f[k];
         put(torque, slip, state == locked ? 0. : slip_sign(state) * law.sense > 0 ? 1. : 2.,
             state == locked ? 0. : torque * slip, block[m.layout.heat + k]);
+    }
+    for (const BacklashLaw& law : m.backlashes) {
+        const double side = flank_side(w.contact[law.device]), twist = speeds[m.masses + law.shaft];
+        const double rate = slip_fast(m.shaft_rate[static_cast<std::size_t>(law.shaft)], speeds);
+        put(side == 0 ? 0. : flank_torque(law, side, twist, rate), twist, side);
     }
     for (int k = 0; k < m.meshes; ++k) {
         const auto i = static_cast<std::size_t>(k);

@@ -110,13 +110,13 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     Mode* mode = &begin_mode(w);
 
     double length = 1;  // of a part, at most
-    const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.description.maximum_parts : 1);
+    const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.maximum_parts : 1);
     for (double done = 0; done < 1;) {
         // Advance over what is left, up to the next jump of a law; in halves where that is too much at once.
         const double split = next_split(w, done);
         double until = part_end(done, split, length);
         integrate(w, *mode, until);
-        while (length > longest_whole && is_coarse(w)) {
+        while (length > longest_whole && (is_coarse(w) || hides_contact(w))) {
             length *= 0.5;
             until = part_end(done, split, length);
             integrate(w, *mode, until);
@@ -125,7 +125,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
         Crossing first = first_crossing(w, *mode, s.begin, s.end);
         const bool inside =
-            first.device >= 0 && localise && outputs.certificate.events < m.description.maximum_events;
+            first.device >= 0 && localise && outputs.certificate.events < m.maximum_events;
         double reached = until;
         if (inside && first.theta * (until - done) < instant) {
             reached = done;

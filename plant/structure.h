@@ -78,12 +78,13 @@ struct Mesh {
     std::array<Link, 2> motion() const noexcept { return {Link{first, 1}, Link{carrier, carrier < 0 ? 0. : -1.}}; }
 };
 
-// A shaft or a damper: a known torque stiffness·twist + damping·(ω_a − ω_b).
+// A shaft or a damper: a known torque stiffness·twist + damping·(ω_a − ω_b). With a gap, only beyond it.
 struct Elastic {
     std::string name;
     std::array<Link, 2> links;
     double stiffness = 0, damping = 0;
-    int source = -1;  // index into description.shafts or .dampers
+    int source = -1;  // index into description.shafts, .backlashes or .dampers
+    double gap = 0;   // the whole play [rad]; 0: none
 };
 
 struct Structure {
@@ -91,7 +92,7 @@ struct Structure {
     std::vector<double> inertia;  // [kg m²] or [kg]
     std::vector<FrictionPair> pairs;
     std::vector<Mesh> meshes;     // gears, then planetary rows, in description order
-    std::vector<Elastic> shafts;
+    std::vector<Elastic> shafts;  // then backlashes
     std::vector<Elastic> dampers;
 
     int masses() const noexcept { return static_cast<int>(inertia.size()); }

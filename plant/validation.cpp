@@ -218,6 +218,7 @@ void check_unique_names(const Description& d) {
     // A mass may lend its name to a device (the engine on the mass "engine"); two devices may not share one.
     seen.clear();
     add("shaft", d.shafts);
+    add("backlash", d.backlashes);
     add("damper", d.dampers);
     add("clutch", d.clutches);
     add("freewheel", d.freewheels);
@@ -253,6 +254,16 @@ void validate(const Description& d) {
         joints.link("shaft", e.name, "a", e.a);
         joints.link("shaft", e.name, "b", e.b);
         distinct("shaft", e.name, "b", e.a, e.b);
+    }
+    for (const Backlash& b : d.backlashes) {
+        const Check check("backlash", b.name);
+        check.positive("stiffness", b.stiffness);
+        check.not_negative("damping", b.damping);
+        check.positive("gap", b.gap);
+        check.any("initial_twist", b.initial_twist);
+        joints.link("backlash", b.name, "a", b.a);
+        joints.link("backlash", b.name, "b", b.b);
+        distinct("backlash", b.name, "b", b.a, b.b);
     }
     for (const Damper& k : d.dampers) {
         Check("damper", k.name).positive("damping", k.damping);

@@ -31,6 +31,7 @@ Table table_of(const Description& d, const Result& result) {
     Table t;
     for (const auto& m : d.masses) t.names.push_back("mass." + m.name + ".speed");
     for (const auto& s : d.shafts) t.names.push_back("shaft." + s.name + ".twist");
+    for (const auto& b : d.backlashes) t.names.push_back("backlash." + b.name + ".twist");
     t.unit.assign(d.masses.size(), 0);
     t.unit.resize(t.names.size(), 1);
     t.smooth = static_cast<int>(t.names.size());
@@ -319,6 +320,9 @@ std::string describe(const Description& d) {
     for (const auto& e : d.shafts)
         s += text("  shaft %s %s-%s k=%.6g d=%.6g twist0=%.6g\n", e.name.c_str(), e.a.c_str(), e.b.c_str(),
                   e.stiffness, e.damping, e.initial_twist);
+    for (const auto& b : d.backlashes)
+        s += text("  backlash %s %s-%s k=%.6g d=%.6g gap=%.6g twist0=%.6g\n", b.name.c_str(), b.a.c_str(), b.b.c_str(),
+                  b.stiffness, b.damping, b.gap, b.initial_twist);
     for (const auto& k : d.dampers)
         s += text("  damper %s %s-%s d=%.6g\n", k.name.c_str(), k.a.c_str(), k.b.c_str(), k.damping);
     for (const auto& c : d.clutches) {

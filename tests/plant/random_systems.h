@@ -23,6 +23,9 @@ RandomSystem random_system(std::uint64_t seed, double seconds);
 // The same machines with some of their clutches replaced by freewheels.
 RandomSystem random_system_with_freewheels(std::uint64_t seed, double seconds);
 
+// The same machines with play in some of their shafts.
+RandomSystem random_system_with_backlashes(std::uint64_t seed, double seconds);
+
 // ∫ waveform dt from 0 to `until`.
 double impulse(const plant::Waveform& waveform, double until);
 

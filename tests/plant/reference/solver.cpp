@@ -445,8 +445,13 @@ void Solver::rk4(double t, double inside, double h, Vector& out, Energy& energy)
 double Solver::fastest_rate() {
     const Vector root = system_.inertia.cwiseSqrt().cwiseInverse();
     const Matrix a = root.asDiagonal() * system_.shaft_columns;
-    const Matrix k = a * system_.stiffness.asDiagonal() * a.transpose();
-    const Matrix d = a * system_.damping.asDiagonal() * a.transpose() +
+    Vector stiffness = system_.stiffness, damping = system_.damping;
+    for (const auto& play : system_.plays) {
+        stiffness[play.shaft] = play.stiffness;
+        damping[play.shaft] = play.damping;
+    }
+    const Matrix k = a * stiffness.asDiagonal() * a.transpose();
+    const Matrix d = a * damping.asDiagonal() * a.transpose() +
                      root.asDiagonal() * system_.damper * root.asDiagonal();
     return std::max(std::sqrt(k.operatorNorm()), d.operatorNorm());
 }

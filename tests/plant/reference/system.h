@@ -92,6 +92,17 @@ struct System {
     Vector inertia;
     Matrix shaft_columns;  // masses × shafts
     Vector stiffness, damping;
+    // A shaft with play has its twist among the shafts, at their end, and its torque from here: no states, no events.
+    struct Play {
+        int shaft;
+        double stiffness, damping, half_gap;
+        double torque(double twist, double rate) const {
+            if (twist > half_gap) return std::max(0.0, stiffness * (twist - half_gap) + damping * rate);
+            if (twist < -half_gap) return std::min(0.0, stiffness * (twist + half_gap) + damping * rate);
+            return 0;
+        }
+    };
+    std::vector<Play> plays;
     Matrix damper;  // M̃ −= damper·ω
     std::vector<Friction> frictions;
     std::vector<Mesh> meshes;
