@@ -11,165 +11,148 @@ double input(const Work& w, int index) noexcept {
     return index < 0 ? 0 : w.operators.input[static_cast<std::size_t>(index)];
 }
 
-StepValues constant(double value) noexcept {
-    return {value, value, value};
-}
 StepValues complement(const StepValues& y) noexcept {
     return {1 - y.begin, 1 - y.middle, 1 - y.end};
 }
 
-// Faults that override the actuation: stuck open, stuck closed.
-bool stuck_pair(const Work& w, const PairLaw& law, PairLoad& load) noexcept {
-    const double fault = input(w, law.stuck);
-    load.fixed = fault > 0.5;
-    if (load.fixed) load.values = constant(fault > 1.5 ? law.full_load : 0);
-    return load.fixed;
-}
-
-bool changes(const PairLaw& law, const PairLoad& load) noexcept {
-    if (load.fixed) return false;
-    switch (law.source) {
-        case LoadSource::waveform:
-            return true;
-        case LoadSource::hydraulic:
-            return !load.hydraulic.rests();
-        case LoadSource::release:
-        case LoadSource::apply:
-            return load.values.begin != load.values.end;
-        default:
-            return false;
-    }
-}
-
-// The load of a pair for the whole step, or its place in the list of those that move.
-void keep_load(Work& w, int pair) {
-    ScratchData& s = w.scratch;
-    const auto i = static_cast<std::size_t>(pair);
-    if (s.loads[i].moves) {
-        s.moving[static_cast<std::size_t>(s.moving_count++)] = pair;
-    } else {
-        s.held[i] = pair_load(w, pair, {w.start, 0, Side::right});
-    }
+// The load of this pair takes its course within the step.
+void let_move(ScratchData& s, int pair) noexcept {
+    s.moves[static_cast<std::size_t>(pair)] = 1;
+    s.moving[static_cast<std::size_t>(s.moving_count++)] = pair;
 }
 
 // The same pressure all the step long.
-void hold_pressure(Work& w, int pair, double pressure) {
+double held_load(const Work& w, int pair, double pressure) noexcept {
+    const auto i = static_cast<std::size_t>(pair);
+    const PairCommand& command = w.operators.commands[i];
+    return command.fixed ? w.operators.rest_loads[i]
+                         : load_from_pressure(w.model.pair_laws[i].friction, pressure * command.scale);
+}
+
+// A pedal on its way.
+void advance_pedal(Work& w, int pair) noexcept {
     const auto i = static_cast<std::size_t>(pair);
     const PairLaw& law = w.model.pair_laws[i];
-    PairLoad& load = w.scratch.loads[i];
-    const bool fixed = stuck_pair(w, law, load);
-    load.moves = false;
-    w.scratch.held[i] = fixed ? load.values.begin : load_from_pressure(law.friction, pressure * load.scale);
+    const PairCommand& command = w.operators.commands[i];
+    double& position = w.next[law.actuator];
+    if (position == command.target) return;  // arrived: its load is known
+    StepValues values = advance_lag(law.lag, position, command.target);
+    if (law.source == LoadSource::release) values = complement(values);
+    if (command.fixed) return;
+    w.scratch.loads[i].values = values;
+    if (values.begin != values.end) {
+        let_move(w.scratch, pair);
+    } else {
+        w.scratch.held[i] = load_from_engagement(law.friction, values.begin);
+    }
+}
+
+void advance_valve_and_piston(Work& w, int pair, double pump_share) noexcept {
+    const auto i = static_cast<std::size_t>(pair);
+    const PairLaw& law = w.model.pair_laws[i];
+    const PairCommand& command = w.operators.commands[i];
+    const ActuationHydraulic& hydraulic = *law.hydraulic;
+    HydraulicState state = read_hydraulic(w.next + law.actuator);
+    double pressure = command.target;
+    if (hydraulic.solenoid) pressure = solenoid_pressure(*hydraulic.solenoid, state.play, pressure);
+    const HydraulicStep step = advance_hydraulics(
+        hydraulic, w.operators.hydraulics[i], law.friction.return_pressure, state,
+        std::span<double>(w.next + law.actuator + hydraulic_slots, static_cast<std::size_t>(law.delay_slots)),
+        pressure, pump_share, command.valve_held);
+    write_hydraulic(w.next + law.actuator, state);
+    if (command.fixed) return;
+    w.scratch.loads[i].hydraulic = step;
+    if (step.rests()) {
+        w.scratch.held[i] = held_load(w, pair, step.chamber(0));
+    } else {
+        let_move(w.scratch, pair);
+    }
+}
+
+bool is_quiet(const Work& w, int pair) noexcept {
+    const auto i = static_cast<std::size_t>(pair);
+    const PairLaw& law = w.model.pair_laws[i];
+    const PairCommand& command = w.operators.commands[i];
+    return !law.hydraulic->solenoid && !command.valve_held &&
+           is_quiet(*law.hydraulic, read_hydraulic(w.next + law.actuator), static_cast<std::size_t>(law.delay_slots),
+                    command.target);
 }
 
 }  // namespace
 
-void advance_actuation(Work& w) SHIFTRIG_REALTIME {
+void latch_commands(Work& w) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    double* block = w.next;
-    double demand = 0;  // on the pump, by all pistons that fill [m³/s]
-    for (int k = 0; k < m.pairs; ++k) {
-        const PairLaw& law = m.pair_laws[static_cast<std::size_t>(k)];
-        if (!law.hydraulic) continue;
-        const auto i = static_cast<std::size_t>(k);
-        const HydraulicState state = read_hydraulic(block + law.actuator);
-        w.scratch.quiet[i] =
-            !law.hydraulic->solenoid && input(w, law.valve_stuck) <= 0.5 &&
-            is_quiet(*law.hydraulic, state, static_cast<std::size_t>(law.delay_slots), input(w, law.command));
-        if (w.scratch.quiet[i]) continue;
-        demand += fill_demand(*law.hydraulic, w.operators.hydraulics[i], law.friction.return_pressure, state);
-    }
-    const double pump = m.description.oil ? m.description.oil->pump_flow : 0;
-    const double share = pump > 0 && demand > pump ? pump / demand : 1;
-
-    w.scratch.moving_count = 0;
     for (int k = 0; k < m.pairs; ++k) {
         const auto i = static_cast<std::size_t>(k);
         const PairLaw& law = m.pair_laws[i];
-        PairLoad& load = w.scratch.loads[i];
-        load.scale = 1;
-        if (law.source >= LoadSource::rolling) {  // by nature, not by actuation
-            load.moves = load.fixed = false;
-            w.scratch.held[i] = law.full_load;
-            continue;
-        }
+        PairCommand& command = w.operators.commands[i];
+        double& load = w.operators.rest_loads[i];
+        command.target = input(w, law.command);
         switch (law.source) {
-            case LoadSource::constant:
-                load.values = constant(1);
-                break;
+            case LoadSource::constant: load = load_from_engagement(law.friction, 1); break;
+            case LoadSource::waveform: load = 0; break;
             case LoadSource::input:
-                load.values = constant(input(w, law.command));
+            case LoadSource::apply: load = load_from_engagement(law.friction, command.target); break;
+            case LoadSource::release: load = load_from_engagement(law.friction, 1 - command.target); break;
+            case LoadSource::hydraulic:
+                command.scale = 1 - input(w, law.leak);
+                command.valve_held = input(w, law.valve_stuck) > 0.5;
+                load = load_from_pressure(law.friction, command.target * command.scale);
                 break;
-            case LoadSource::release:
-                load.values = complement(advance_lag(law.lag, block[law.actuator], input(w, law.command)));
-                break;
-            case LoadSource::apply:
-                load.values = advance_lag(law.lag, block[law.actuator], input(w, law.command));
-                break;
-            case LoadSource::hydraulic: {
-                HydraulicState state = read_hydraulic(block + law.actuator);
-                load.scale = 1 - input(w, law.leak);
-                if (w.scratch.quiet[i]) {
-                    hold_pressure(w, k, state.chamber);
-                    continue;
-                }
-                const ActuationHydraulic& hydraulic = *law.hydraulic;
-                double command = input(w, law.command);
-                if (hydraulic.solenoid) command = solenoid_pressure(*hydraulic.solenoid, state.play, command);
-                load.hydraulic = advance_hydraulics(
-                    hydraulic, w.operators.hydraulics[i], law.friction.return_pressure, state,
-                    std::span<double>(block + law.actuator + hydraulic_slots,
-                                      static_cast<std::size_t>(law.delay_slots)),
-                    command, share, input(w, law.valve_stuck) > 0.5);
-                write_hydraulic(block + law.actuator, state);
-                break;
-            }
-            default:
-                break;
+            default: load = law.full_load; continue;  // by nature, not by actuation
         }
-        stuck_pair(w, law, load);
-        load.moves = changes(law, load);
-        keep_load(w, k);
+        // Faults that override the actuation: stuck open, stuck closed.
+        const double fault = input(w, law.stuck);
+        command.fixed = fault > 0.5;
+        if (command.fixed) load = fault > 1.5 ? law.full_load : 0;
+    }
+}
+
+void advance_actuation(Work& w) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    ScratchData& s = w.scratch;
+    // Most stand where their commands want them.
+    std::copy(w.operators.rest_loads.begin(), w.operators.rest_loads.end(), s.held.begin());
+    std::fill(s.moves.begin(), s.moves.end(), static_cast<unsigned char>(0));
+    s.moving_count = 0;
+
+    int busy = 0;
+    double demand = 0;  // on the pump, by all pistons that fill [m³/s]
+    for (const int k : m.hydraulic_pairs) {
+        if (is_quiet(w, k)) continue;
+        const auto i = static_cast<std::size_t>(k);
+        const PairLaw& law = m.pair_laws[i];
+        s.busy[static_cast<std::size_t>(busy++)] = k;
+        demand += fill_demand(*law.hydraulic, w.operators.hydraulics[i], law.friction.return_pressure,
+                              read_hydraulic(w.next + law.actuator));
+    }
+    const double pump = m.description.oil ? m.description.oil->pump_flow : 0;
+    const double share = pump > 0 && demand > pump ? pump / demand : 1;
+    for (int i = 0; i < busy; ++i) advance_valve_and_piston(w, s.busy[static_cast<std::size_t>(i)], share);
+    for (const int k : m.pedal_pairs) advance_pedal(w, k);
+    for (const int k : m.waveform_pairs) {
+        if (!w.operators.commands[static_cast<std::size_t>(k)].fixed) let_move(s, k);
     }
 }
 
 void hold_actuation(Work& w) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    const double* block = w.state;
-    w.scratch.moving_count = 0;
-    for (int k = 0; k < m.pairs; ++k) {
+    ScratchData& s = w.scratch;
+    std::copy(w.operators.rest_loads.begin(), w.operators.rest_loads.end(), s.held.begin());
+    std::fill(s.moves.begin(), s.moves.end(), static_cast<unsigned char>(0));
+    s.moving_count = 0;
+    for (const int k : m.hydraulic_pairs) {
+        s.held[static_cast<std::size_t>(k)] = held_load(w, k, chamber_pressure(w.state, m.pair_laws[static_cast<std::size_t>(k)]));
+    }
+    for (const int k : m.pedal_pairs) {
         const auto i = static_cast<std::size_t>(k);
+        if (w.operators.commands[i].fixed) continue;
         const PairLaw& law = m.pair_laws[i];
-        PairLoad& load = w.scratch.loads[i];
-        load.scale = 1;
-        if (law.source >= LoadSource::rolling) {
-            load.moves = load.fixed = false;
-            w.scratch.held[i] = law.full_load;
-            continue;
-        }
-        switch (law.source) {
-            case LoadSource::constant:
-                load.values = constant(1);
-                break;
-            case LoadSource::input:
-                load.values = constant(input(w, law.command));
-                break;
-            case LoadSource::release:
-                load.values = constant(1 - block[law.actuator]);
-                break;
-            case LoadSource::apply:
-                load.values = constant(block[law.actuator]);
-                break;
-            case LoadSource::hydraulic:
-                load.scale = 1 - input(w, law.leak);
-                hold_pressure(w, k, read_hydraulic(block + law.actuator).chamber);
-                continue;
-            default:
-                break;
-        }
-        stuck_pair(w, law, load);
-        load.moves = law.source == LoadSource::waveform && !load.fixed;
-        keep_load(w, k);
+        const double position = w.state[law.actuator];
+        s.held[i] = load_from_engagement(law.friction, law.source == LoadSource::release ? 1 - position : position);
+    }
+    for (const int k : m.waveform_pairs) {
+        if (!w.operators.commands[static_cast<std::size_t>(k)].fixed) let_move(s, k);
     }
 }
 
@@ -181,7 +164,6 @@ double pair_load(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {
     const auto i = static_cast<std::size_t>(pair);
     const PairLaw& law = w.model.pair_laws[i];
     const PairLoad& load = w.scratch.loads[i];
-    if (load.fixed) return load.values.begin;
     if (law.source == LoadSource::waveform) {
         return load_from_engagement(law.friction, waveform(*law.profile, at.time, at.side));
     }
@@ -193,7 +175,7 @@ double pair_load(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {
         const double pressure = before
                                     ? step.spring_begin + (step.spring_end - step.spring_begin) * at.fraction
                                     : step.valve.at(at.fraction);
-        return load_from_pressure(law.friction, pressure * load.scale);
+        return load_from_pressure(law.friction, pressure * w.operators.commands[i].scale);
     }
     return load_from_engagement(law.friction, load.values.at(at.fraction));
 }
@@ -209,12 +191,12 @@ Instant instant_at(const Work& w, double fraction, Side side) noexcept {
 }  // namespace
 
 bool is_pressed(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {
-    if (!w.scratch.loads[static_cast<std::size_t>(pair)].moves || at.fraction >= 1) return false;
+    if (!w.scratch.moves[static_cast<std::size_t>(pair)] || at.fraction >= 1) return false;
     return pair_load(w, pair, instant_at(w, at.fraction + a_little, Side::left)) > 0;
 }
 
 double load_edge(const Work& w, int pair, double from, double until) SHIFTRIG_REALTIME {
-    if (!w.scratch.loads[static_cast<std::size_t>(pair)].moves) return 1;
+    if (!w.scratch.moves[static_cast<std::size_t>(pair)]) return 1;
     double before = from + a_little, after = until - a_little;
     const bool pressed = pair_load(w, pair, instant_at(w, before, Side::left)) > 0;
     if ((pair_load(w, pair, instant_at(w, after, Side::left)) > 0) == pressed) return 1;

@@ -93,6 +93,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
         lower = v.lower;
     }
 
+    list_passing_pairs(w);
     if (s.begin_groups != &mode) {
         read_groups(m, t, begin.z, v.begin);
         group_forces(t, begin.f, v.begin.force);
@@ -124,7 +125,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
         }
         show_speeds(t, v.stage_speed, stage.z);
         tree_slips(m, mode, stage);
-        evaluate_forces(w, w.contact, stage, Extent::moving_pairs);
+        stage_forces(w, stage);
         group_forces(t, stage.f, v.stage_force[i - 1]);
         std::copy(stage.auxiliary_rate, stage.auxiliary_rate + m.auxiliary, v.auxiliary[i]);
         sums.torque[i] = v.stage_torque[i - 1];
@@ -186,7 +187,7 @@ double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
                         (v.end.torque[g] + v.end.force[g]) * t.inverse_mass[g];
     }
     s.middle.at = s.half.at;
-    evaluate_forces(w, w.contact, s.middle, Extent::moving_pairs);
+    stage_forces(w, s.middle);
     if (m.tree->lossy) {
         // Twists half way as well, for the torques of the gears.
         for (int g = 0; g < t.paths.groups; ++g) {

@@ -11,7 +11,8 @@ enum PairState : unsigned char { locked = 0, slips_forward = 1, slips_backward =
 
 constexpr bool slips(unsigned char pair) noexcept { return pair == slips_forward || pair == slips_backward; }
 constexpr double slip_sign(unsigned char pair) noexcept {
-    return pair == slips_forward ? 1. : pair == slips_backward ? -1. : 0.;
+    constexpr double signs[] = {0, 1, -1, 0};
+    return signs[pair];
 }
 constexpr unsigned char slipping(double sign) noexcept { return sign < 0 ? slips_backward : slips_forward; }
 

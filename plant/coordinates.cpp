@@ -102,15 +102,18 @@ void build_view(const ModelData& m, const Mode& mode, const double* expansion, d
     std::fill(view, view + rows * mode.order, 0.);
     for (int c = 0; c < mode.order; ++c) {
         const double* z = expansion + c * m.states_padded;
-        double* next = std::copy(z, z + m.states, view + c * rows);
+        double* const column = view + c * rows;
+        double* next = column;
         for (int k = 0; k < m.forces; ++k) {
             const bool held =
                 k < m.pairs && mode.bound[k];  // others hold it at zero: not even rounding is left
             *next++ = held ? 0 : slip(m.force_columns[static_cast<std::size_t>(k)], z);
         }
+        next = column + m.law_rows;
         for (int k = 0; k < m.meshes; ++k) *next++ = slip(m.mesh_loss[static_cast<std::size_t>(k)], z);
         for (const auto& shaft : m.shaft_rate) *next++ = slip(shaft, z);
         for (const auto& damper : m.damper_rate) *next++ = slip(damper, z);
+        std::copy(z, z + m.states, column + m.power_rows);
     }
     to_panels(view, m.seen, mode.order, mode.view);
 }
@@ -223,6 +226,7 @@ void build_coordinates(const ModelData& m, Mode& mode, const double* motion, con
     double* folded = both + all_rows * m.columns;
     fold(m, mode, expansion, both, all_rows, folded);
     to_panels(folded, mode.row_count + translating, columns, mode.torques);
+    to_panels(folded + all_rows * mode.order, mode.row_count + translating, m.forces, mode.force_torques);
 
     double* full = scratch;
     build_balance(m, mode, expansion, full, full + padded(mode.row_count) * (m.columns + mode.row_count));

@@ -21,33 +21,34 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     if (whole) {
         s.used = mode.step;
     } else {
-        s.used = build_step_operators(m, mode, h, s.operator_memory.data(), s.workspace.data());
+        s.used = build_step_operators(m, mode, h, s.operator_memory.data()->value, s.workspace.data());
     }
     const StepOperators& op = s.used;
     const auto multiply = m.kernel.multiply;
     const double middle = 0.5 * (begin.at.fraction + end_fraction);
     half.at = {w.start + middle * w.h, middle, Side::right};
     late.at = end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
+    list_passing_pairs(w);
 
     // One block of coordinates each for half way, the late stage and the end: first what the beginning gives to all
     // three, then what each stage adds to those after it.
-    const int block = padded(mode.order);
-    double* const at_half = s.vector_a.data();
+    const int n = mode.order, block = padded(n);
+    double* const at_half = s.vector_a;
     double* const at_late = at_half + block;
     double* const at_end = at_late + block;
-    multiply(op.from_begin, 3 * block, mode.order + m.forces, read_coordinates(mode, begin), nullptr,
-             at_half);
+    multiply(op.from_begin, 3 * block, n + m.forces, read_coordinates(mode, begin), nullptr, at_half);
     for (int i = 0; i < m.auxiliary; ++i)
         half.auxiliary[i] = begin.auxiliary[i] + 0.5 * h * begin.auxiliary_rate[i];
-    show(m, mode, at_half, half);
-    evaluate_forces(w, w.contact, half);
+    std::copy(at_half, at_half + n, half.f - n);
+    show(m, mode, at_half, half, m.law_rows);
+    stage_forces(w, half);
 
     multiply(op.from_half, 2 * block, m.forces, half.f, at_late, at_late);
     for (int i = 0; i < m.auxiliary; ++i) {
         late.auxiliary[i] = begin.auxiliary[i] + h * (2 * half.auxiliary_rate[i] - begin.auxiliary_rate[i]);
     }
-    show(m, mode, at_late, late);
-    evaluate_forces(w, w.contact, late, Extent::moving_pairs);
+    show(m, mode, at_late, late, m.law_rows);
+    stage_forces(w, late);
 
     multiply(op.from_late, block, m.forces, late.f, at_end, at_end);
     for (int i = 0; i < m.auxiliary; ++i) {
@@ -55,9 +56,10 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
             begin.auxiliary[i] +
             h / 6 * (begin.auxiliary_rate[i] + 4 * half.auxiliary_rate[i] + late.auxiliary_rate[i]);
     }
-    show(m, mode, at_end, end);
+    std::copy(at_end, at_end + n, end.f - n);
+    show(m, mode, at_end, end, padded(m.seen));
     evaluate_forces(w, w.contact, end);
-    internal_torques(w, mode, end);
+    active_torques(m, mode, end);
 }
 
 }  // namespace shiftrig::plant::detail

@@ -22,25 +22,31 @@ void load_sample(const ModelData& m, const double* block, double time, Sample& s
     s.at = {time, 0, Side::right};
 }
 
+// What a beginning is made of besides inputs: speeds to contact states, engine modes.
+template <typename Function>
+void for_motion(const ModelData& m, const Function& function) {
+    const StateLayout& at = m.layout;
+    function(at.speeds, at.actuators - at.speeds);
+    function(at.engines, 3 * static_cast<int>(m.engines.size()));
+}
+
 // Is the sample that the last step ended with the beginning of this one? Then its forces and torques are
 // what computing them again would give, bit for bit.
-bool is_carried(const ModelData& m, const OperatorsData& o, const double* block,
-                const unsigned char* contact) {
+bool is_carried(const ModelData& m, const OperatorsData& o, const double* block) {
     if (!o.carried || m.depends_on_time) return false;
-    const Sample& s = o.samples[0];
-    const auto same = [](const void* a, const void* b, std::size_t bytes) {
-        return std::memcmp(a, b, bytes) == 0;
-    };
-    if (!same(s.z, block + m.layout.speeds, static_cast<std::size_t>(m.states) * sizeof(double)))
-        return false;
-    if (!same(s.auxiliary, block + m.layout.auxiliary,
-              static_cast<std::size_t>(m.auxiliary) * sizeof(double)))
-        return false;
-    if (!same(o.carried_contact.data(), contact, o.carried_contact.size())) return false;
-    for (std::size_t e = 0; e < o.carried_modes.size(); ++e) {
-        if (o.carried_modes[e] != block[m.layout.engines + 3 * static_cast<int>(e)]) return false;
-    }
-    return true;
+    bool same = true;
+    const double* known = o.carried_motion.data();
+    for_motion(m, [&](int first, int count) {
+        const auto size = static_cast<std::size_t>(count);
+        same = same && std::memcmp(known, block + first, size * sizeof(double)) == 0;
+        known += count;
+    });
+    return same;
+}
+
+void carry(const ModelData& m, OperatorsData& o, const double* block) {
+    double* known = o.carried_motion.data();
+    for_motion(m, [&](int first, int count) { known = std::copy(block + first, block + first + count, known); });
 }
 
 void reset(Outputs& outputs, ScratchData& scratch) {
@@ -58,16 +64,13 @@ double input(const Work& w, int index) {
 
 void advance_temperatures(Work& w) {
     const ModelData& m = w.model;
-    const double oil = input(w, m.oil_temperature);
-    for (int k = 0; k < m.pairs; ++k) {
+    const double oil = input(w, m.oil_temperature), per_step = 1 / w.h;
+    for (const int k : m.heated_pairs) {
         const PairLaw& law = m.pair_laws[static_cast<std::size_t>(k)];
-        if (!law.heat) continue;
         double* at = w.next + law.temperature;
         HeatState state{at[0], at[1]};
-        advance_heat(law.heat_operator, state, w.scratch.heat[static_cast<std::size_t>(k)] / w.h, oil);
-        const auto passes = [&](double limit) {
-            return limit > 0 && at[0] < limit && state.surface >= limit;
-        };
+        advance_heat(law.heat_operator, state, w.scratch.heat[static_cast<std::size_t>(k)] * per_step, oil);
+        const auto passes = [&](double limit) { return limit > 0 && at[0] < limit && state.surface >= limit; };
         const double end = w.start + w.h;
         if (passes(law.heat->warn_temperature))
             log_event(w, EventKind::facing_warning, k, end, 0, 0, state.surface);
@@ -101,17 +104,17 @@ void advance_engine_modes(Work& w) {
     }
 }
 
-void advance_sensors(Work& w, const double* old_speeds) {
+// While the block still holds the speeds that the step began with.
+void advance_sensors(Work& w, const double* end_speeds) {
     const ModelData& m = w.model;
-    const auto count = static_cast<std::uint64_t>(read_integer(w.next));
-    for (std::size_t i = 0; i < m.sensors.size(); ++i) {
-        const SensorLaw& law = m.sensors[i];
-        double* at = w.next + m.layout.sensors + 4 * static_cast<int>(i);
+    const double* begin_speeds = w.next + m.layout.speeds;
+    double* at = w.next + m.layout.sensors;
+    for (std::size_t i = 0; i < m.sensors.size(); ++i, at += 4) {
+        const int mass = m.sensors[i].mass;
+        const SensorFaults& faults = w.operators.sensor_faults[i];
         SensorState state{at[0], at[1], at[2], at[3]};
-        const SensorFaults faults{input(w, law.bias), input(w, law.noise), input(w, law.stuck) > 0.5,
-                                  input(w, law.dropout) > 0.5, static_cast<int>(input(w, law.missing_teeth))};
-        advance_pickup(m.description.sensors[i], state, old_speeds[law.mass],
-                       w.next[m.layout.speeds + law.mass], w.h, faults.missing_teeth);
+        advance_pickup(m.description.sensors[i], state, begin_speeds[mass], end_speeds[mass], w.h, faults.missing_teeth);
+        const auto count = static_cast<std::uint64_t>(read_integer(w.next) + 1);
         const double deviate = faults.noise > 0 ? noise(noise_seed, i, count) : 0;
         sensor_output(state, faults, deviate);
         at[0] = state.position;
@@ -121,19 +124,15 @@ void advance_sensors(Work& w, const double* old_speeds) {
     }
 }
 
-// Calls with the kinematic column of every active row.
-template <typename Function>
-void for_rows(const ModelData& m, const Mode& mode, const Function& function) {
-    for (int r = 0; r < mode.row_count; ++r) {
-        const int unknown = mode.rows[r];
-        if (unknown < m.pairs) {
-            function(m.pair_slip[static_cast<std::size_t>(unknown)]);
-        } else if (unknown < m.pairs + m.meshes) {
-            function(m.mesh_slip[static_cast<std::size_t>(unknown - m.pairs)]);
-        } else {
-            function(m.mesh_motion[static_cast<std::size_t>(unknown - m.pairs - m.meshes)]);
-        }
+// max |v_i| of four running ones.
+double largest(const double* v, int count) {
+    double of[4] = {};
+    int i = 0;
+    for (; i + 4 <= count; i += 4) {
+        for (int lane = 0; lane < 4; ++lane) of[lane] = std::max(of[lane], std::fabs(v[i + lane]));
     }
+    for (; i < count; ++i) of[0] = std::max(of[0], std::fabs(v[i]));
+    return std::max(std::max(of[0], of[1]), std::max(of[2], of[3]));
 }
 
 // Residual of [Algin] eq. (15) at the sample, relative to the largest torque in it.
@@ -142,18 +141,15 @@ double torque_residual(Work& w, const Mode& mode, const Sample& s) {
     if (mode.row_count == 0) return 0;
     const int columns = mode.order + m.forces + mode.row_count;
     const double* terms = s.f - mode.order;  // q, f, M
-    double* rest = w.scratch.vector_a.data();
+    double* rest = w.scratch.vector_a;
     m.kernel.multiply(mode.balance, padded(mode.row_count), columns, terms, nullptr, rest);
-    double scale = 0, worst = 0;
-    for (int c = mode.order; c < columns; ++c) scale = std::max(scale, std::fabs(terms[c]));
-    for (int r = 0; r < mode.row_count; ++r) worst = std::max(worst, std::fabs(rest[r]));
-    return scale > 0 ? worst / scale : 0;
+    const double scale = largest(terms + mode.order, m.forces + mode.row_count);
+    return scale > 0 ? largest(rest, mode.row_count) / scale : 0;
 }
 
-double constraint_violation(const Work& w, const Mode& mode, const double* speeds) {
+double constraint_violation(const Mode& mode, const double* speeds) {
     double worst = 0;
-    for_rows(w.model, mode,
-             [&](const auto& links) { worst = std::max(worst, std::fabs(slip_fast(links, speeds))); });
+    for (int r = 0; r < mode.row_count; ++r) worst = std::max(worst, std::fabs(slip_fast(mode.row_links[r], speeds)));
     return worst;
 }
 
@@ -200,11 +196,13 @@ Work begin_step(const ModelData& m, OperatorsData& operators, State& state, Outp
     reset(outputs, scratch);
     scratch.begin = operators.samples[0];
     scratch.end = operators.samples[1];
-    if (is_carried(m, operators, block, contact)) {
+    if (is_carried(m, operators, block)) {
         scratch.begin.at = {time, 0, Side::right};
+        scratch.stored_before = operators.carried_energy;
     } else {
         operators.carried = false;
         load_sample(m, block, time, scratch.begin);
+        scratch.stored_before = stored_energy(m, scratch.begin.z, contact);
     }
     std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
@@ -217,11 +215,11 @@ Work begin_step(const ModelData& m, OperatorsData& operators, State& state, Outp
 
 bool is_begun(const Work& w) SHIFTRIG_REALTIME {
     if (!w.operators.carried) return false;
-    const Sample& s = w.scratch.begin;
-    for (int k = 0; k < w.model.pairs; ++k) {
+    const ScratchData& scratch = w.scratch;
+    const Sample& s = scratch.begin;
+    for (int k = 0; k < w.model.actuated_pairs; ++k) {
         const auto i = static_cast<std::size_t>(k);
-        if (w.model.pair_laws[i].source >= LoadSource::rolling) continue;
-        if ((w.scratch.loads[i].moves ? pair_load(w, k, s.at) : w.scratch.held[i]) != s.load[k]) return false;
+        if ((scratch.moves[i] ? pair_load(w, k, s.at) : scratch.held[i]) != s.load[k]) return false;
     }
     return true;
 }
@@ -259,21 +257,10 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     double* block = w.next;
     Certificate& certificate = w.outputs.certificate;
 
-    w.operators.samples[0] = s.begin;
-    w.operators.samples[1] = s.end;
-    w.operators.carried = s.carries;
-    std::copy(w.contact, w.contact + m.contact_bytes, w.operators.carried_contact.begin());
-    for (std::size_t e = 0; e < m.engines.size(); ++e) {
-        w.operators.carried_modes[e] = block[layout.engines + 3 * static_cast<int>(e)];
-    }
-
-    double* old_speeds = s.vector_c.data();
-    std::copy(block + layout.speeds, block + layout.speeds + m.masses, old_speeds);
+    advance_sensors(w, s.begin.z);
     write_integer(block, read_integer(block) + 1);
-    const double before = stored_energy(m, block + layout.speeds, s.before.data());  // twists follow the speeds
-    std::copy(s.begin.z, s.begin.z + m.states, block + layout.speeds);
+    std::copy(s.begin.z, s.begin.z + m.states, block + layout.speeds);  // twists follow the speeds
     std::copy(s.begin.auxiliary, s.begin.auxiliary + m.auxiliary, block + layout.auxiliary);
-    advance_sensors(w, old_speeds);
     advance_engine_modes(w);
     advance_temperatures(w);
     for (int k = 0; k < m.pairs; ++k) block[layout.heat + k] += s.heat[static_cast<std::size_t>(k)];
@@ -281,20 +268,25 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     block[layout.energy + 1] += s.dissipated;
 
     s.stored = stored_energy(m, s.begin.z, w.contact);
-    certificate.energy_defect = s.stored - before - s.input_work + s.dissipated;
+    certificate.energy_defect = s.stored - s.stored_before - s.input_work + s.dissipated;
     certificate.torque_residual = mode.tree ? s.torque_residual : torque_residual(w, mode, s.begin);
-    certificate.constraint_violation = constraint_violation(w, mode, s.begin.z);
+    certificate.constraint_violation = constraint_violation(mode, s.begin.z);
     certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
-    double sum = 0;
-    for (int i = 0; i < m.states; ++i) sum += s.begin.z[i];
-    if (!std::isfinite(sum)) certificate.flags |= 4;
+    if (!std::isfinite(s.stored)) certificate.flags |= 4;  // a sum over every speed and twist
     report_changes(w, mode);
     fill_outputs(w, mode, s.begin);
+
+    OperatorsData& o = w.operators;
+    o.samples[0] = s.begin;
+    o.samples[1] = s.end;
+    o.carried = s.carries;
+    o.carried_energy = s.stored;
+    carry(m, o, block);
 }
 
 void finish_look(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     Sample& s = w.scratch.begin;
-    w.outputs.certificate.constraint_violation = constraint_violation(w, mode, s.z);
+    w.outputs.certificate.constraint_violation = constraint_violation(mode, s.z);
     w.outputs.certificate.torque_residual =
         mode.tree ? w.scratch.torque_residual : torque_residual(w, mode, s);
     w.outputs.certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);

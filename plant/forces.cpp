@@ -25,16 +25,22 @@ double open_drag(const Work& w, int k, const Sample& s) noexcept {
 void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
     const ModelData& m = w.model;
     const PairLaw* laws = m.pair_laws.data();
-    for (int k = 0; k < m.pairs; ++k) {
-        const PairLaw& law = laws[k];
-        const double load = s.load[k];
-        s.holding[k] = load * law.friction.static_factor;
-        if (contact[k] != locked && load != 0) {  // one that is about to engage shows what it would pass
-            s.sliding[k] = sliding_capacity(law.friction, load, s.slip[k]);
+    const double *const static_factor = m.static_factor.data(), *const sliding_at_rest = m.sliding_at_rest.data();
+    const double* const load = s.load;
+    double *__restrict holding = s.holding, *__restrict sliding = s.sliding;
+    const int pairs = m.pairs;
+    for (int k = 0; k < pairs; ++k) {
+        holding[k] = load[k] * static_factor[k];
+        sliding[k] = load[k] * sliding_at_rest[k];
+    }
+    std::fill(s.f, s.f + pairs, 0.);
+    for (int k = 0; k < pairs; ++k) {
+        if (contact[k] == locked) continue;
+        if (s.load[k] != 0) {  // one that is about to engage shows what it would pass
+            s.sliding[k] = sliding_capacity(laws[k].friction, s.load[k], s.slip[k]);
             s.f[k] = slip_sign(contact[k]) * s.sliding[k];
-        } else {
-            s.sliding[k] = load * law.sliding_at_rest;
-            s.f[k] = contact[k] == free_running && law.drag > 0 ? open_drag(w, k, s) : 0;
+        } else if (contact[k] == free_running && laws[k].drag > 0) {
+            s.f[k] = open_drag(w, k, s);
         }
     }
 }
@@ -94,89 +100,135 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
     for (std::size_t i = 0; i < m.road_mass.size(); ++i) {
         known.grade_forces[i] = grade_force(m.description.roads[i], input(w, m.grade), m.description.gravity);
     }
+    for (std::size_t i = 0; i < m.sensors.size(); ++i) {
+        const SensorLaw& law = m.sensors[i];
+        known.sensor_faults[i] = {input(w, law.bias), input(w, law.noise), input(w, law.stuck) > 0.5,
+                                  input(w, law.dropout) > 0.5, static_cast<int>(input(w, law.missing_teeth))};
+    }
+    latch_commands(w);
     known.draft = m.draft < 0 ? 1 : input(w, m.draft);
     at_oil_temperature(m, w.operators, input(w, m.oil_temperature));
 }
 
-void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s,
-                     Extent extent) SHIFTRIG_REALTIME {
+namespace {
+
+// Torques that no contact state concerns, rates of the auxiliary states, and what the laws press together. They read
+// speeds where they act: f[force] is paid for by −slip[force].
+void law_forces(const Work& w, Sample& s) noexcept {
     const ModelData& m = w.model;
     const Description& d = m.description;
     const OperatorsData& known = w.operators;
-    const ScratchData& scratch = w.scratch;
-    std::copy(scratch.held.begin(), scratch.held.end(), s.load);
-    for (int i = 0; i < scratch.moving_count; ++i) {
-        const int k = scratch.moving[static_cast<std::size_t>(i)];
-        if (extent == Extent::all_pairs || contact[k] != locked) s.load[k] = pair_load(w, k, s.at);
-    }
-    for (int k = m.first_external; k < m.forces; ++k) s.f[k] = 0;
-    double input_power = 0, field_power = 0;
-    const auto add = [&](int mass, double torque) {
-        s.f[m.external_force[static_cast<std::size_t>(mass)]] += torque;
-    };
-    const auto drive = [&](int mass, double torque) {
-        add(mass, torque);
-        input_power += torque * s.z[mass];
-    };
-
+    std::fill(s.f + m.first_external, s.f + m.forces, 0.);
     const double* auxiliary = s.auxiliary;
     double* rate = s.auxiliary_rate;
     for (std::size_t t = 0; t < m.tyres.size(); ++t, ++auxiliary, ++rate) {
         const TyreLaw& law = m.tyres[t];
         const BrixiusTyre& tyre = d.tyres[t];
-        const double wheel_speed = s.z[law.wheel], body_speed = s.z[law.body];
-        *rate = tyre_slip_rate(tyre, *auxiliary, wheel_speed, body_speed);
-        const double slip = s.tyre_slip[t] = tyre_slip(tyre, *auxiliary, *rate, wheel_speed, body_speed);
+        const double wheel_speed = -s.slip[law.wheel_force], body_speed = -s.slip[law.body_force];
+        const TyreMotion motion = tyre_motion(tyre, *auxiliary, wheel_speed, body_speed);
+        *rate = motion.rate;
+        const double slip = s.tyre_slip[t] = motion.slip;
         const double force = s.tyre_force[t] = tyre_force(known.soils[t], slip);
-        add(law.wheel, -force * tyre.radius);
-        add(law.body, force);
+        s.f[law.wheel_force] -= force * tyre.radius;
+        s.f[law.body_force] += force;
         s.load[law.resistance] += tyre_resistance(known.soils[t], slip);
-        field_power += force * (wheel_speed * tyre.radius - body_speed);
     }
     for (std::size_t e = 0; e < m.engines.size(); ++e, auxiliary += 2, rate += 2) {
         const EngineLaw& law = m.engines[e];
         const Engine& engine = d.engines[e];
         const EngineState state{auxiliary[0], auxiliary[1]};
-        const EngineMode mode = scratch.engine_modes[e];
-        const double speed = s.z[law.mass];
+        const EngineMode mode = w.scratch.engine_modes[e];
+        const double speed = -s.slip[law.force];
+        const double full = s.engine_full_load[e] = full_load(engine, law.full_load, speed);
         EngineState change;
         if (mode == EngineMode::running)
-            change = engine_rate(engine, law.peak, known.engine_inputs[e], state, speed);
+            change = engine_rate(engine, law.peak, known.engine_inputs[e], state, speed, full);
         rate[0] = change.torque;
         rate[1] = change.boost;
-        s.engine_torque[e] = engine_torque(engine, law.peak, known.engine_inputs[e], state, mode, speed);
-        drive(law.mass, s.engine_torque[e]);
+        s.engine_torque[e] = engine_torque(engine, law.peak, known.engine_inputs[e], state, mode, speed, full);
+        s.f[law.force] += s.engine_torque[e];
         s.load[law.pair] = stalled_friction_capacity(engine, mode, speed);
     }
     for (std::size_t c = 0; c < m.converters.size(); ++c) {
-        const int pump = m.converters[c].pump, turbine = m.converters[c].turbine;
-        const ConverterTorques torques = converter_torques(d.converters[c], s.z[pump], s.z[turbine]);
+        const ConverterLaw& law = m.converters[c];
+        const ConverterTorques torques =
+            converter_torques(d.converters[c], -s.slip[law.pump_force], -s.slip[law.turbine_force]);
         s.converter[2 * c] = torques.pump;
         s.converter[2 * c + 1] = torques.turbine;
-        add(pump, -torques.pump);
-        add(turbine, torques.turbine);
-        field_power += torques.pump * s.z[pump] - torques.turbine * s.z[turbine];
+        s.f[law.pump_force] -= torques.pump;
+        s.f[law.turbine_force] += torques.turbine;
     }
     for (std::size_t i = 0; i < m.sources.size(); ++i) {
         const TorqueSource& source = d.sources[i];
-        const int mass = m.sources[i].mass;
+        const int force = m.sources[i].force;
         double torque = waveform(source.waveform, s.at.time, s.at.side) + input(w, m.sources[i].input);
-        if (source.quadratic != 0) torque -= source.quadratic * s.z[mass] * std::fabs(s.z[mass]);
-        drive(mass, torque);
+        if (source.quadratic != 0) torque += source.quadratic * s.slip[force] * std::fabs(s.slip[force]);
+        s.f[force] += torque;
     }
-    for (std::size_t i = 0; i < m.road_mass.size(); ++i) {
-        const int body = m.road_mass[i];
-        drive(body, known.grade_forces[i] + air_force(d.roads[i], s.z[body]));
+    for (std::size_t i = 0; i < m.road_force.size(); ++i) {
+        const int force = m.road_force[i];
+        s.f[force] += known.grade_forces[i] + air_force(d.roads[i], -s.slip[force]);
     }
-    for (std::size_t p = 0; p < m.plough_mass.size(); ++p) {
-        s.load[m.plough_pair[p]] += plough_draft(d.ploughs[p], s.z[m.plough_mass[p]], known.draft);
+    for (std::size_t p = 0; p < m.plough_pair.size(); ++p) {
+        s.load[m.plough_pair[p]] += plough_draft(d.ploughs[p], -s.slip[m.plough_force[p]], known.draft);
     }
-    s.input_power = input_power;
-    s.field_power = field_power;
+}
+
+}  // namespace
+
+void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHIFTRIG_REALTIME {
+    const ScratchData& scratch = w.scratch;
+    std::copy(scratch.held.begin(), scratch.held.end(), s.load);
+    for (int i = 0; i < scratch.moving_count; ++i) {
+        const int k = scratch.moving[static_cast<std::size_t>(i)];
+        s.load[k] = pair_load(w, k, s.at);
+    }
+    law_forces(w, s);
     pair_forces(w, contact, s);
     freewheel_forces(w, contact, s);
     flank_forces(w, contact, s);
     bearing_forces(w, contact, s);
+}
+
+void list_passing_pairs(Work& w) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    ScratchData& s = w.scratch;
+    s.sliding_count = s.dragging_count = 0;
+    int sliding = 0, dragging = 0;
+    for (int k = 0; k < m.pairs; ++k) {
+        const unsigned char state = w.contact[k];
+        if (state == locked) continue;
+        const auto i = static_cast<std::size_t>(k);
+        if (state != free_running) {
+            const bool pressed = s.held[i] != 0 || s.moves[i] || k >= m.actuated_pairs;
+            if (pressed) s.sliding[static_cast<std::size_t>(sliding++)] = k;
+        } else if (m.pair_laws[i].drag > 0) {
+            s.dragging[static_cast<std::size_t>(dragging++)] = k;
+        }
+    }
+    s.sliding_count = sliding;
+    s.dragging_count = dragging;
+}
+
+void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const ScratchData& scratch = w.scratch;
+    std::copy(scratch.held.begin(), scratch.held.end(), s.load);
+    std::fill(s.f, s.f + m.first_external, 0.);
+    law_forces(w, s);
+    for (int i = 0; i < scratch.sliding_count; ++i) {
+        const int k = scratch.sliding[static_cast<std::size_t>(i)];
+        const auto at = static_cast<std::size_t>(k);
+        const double load = scratch.moves[at] ? pair_load(w, k, s.at) : s.load[k];
+        s.f[k] = slip_sign(w.contact[k]) * sliding_capacity(m.pair_laws[at].friction, load, s.slip[k]);
+    }
+    for (int i = 0; i < scratch.dragging_count; ++i) {
+        const int k = scratch.dragging[static_cast<std::size_t>(i)];
+        s.f[k] = open_drag(w, k, s);
+    }
+    freewheel_forces(w, w.contact, s);
+    flank_forces(w, w.contact, s);
+    bearing_forces(w, w.contact, s);
 }
 
 void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIFTRIG_REALTIME {
@@ -193,27 +245,33 @@ void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIF
 
 void internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     if (mode.tree) return tree_internal_torques(w, mode, s);
-    const ModelData& m = w.model;
+    read_coordinates(mode, s);
+    active_torques(w.model, mode, s);
+}
+
+void active_torques(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const int rows = mode.row_count + static_cast<int>(m.translating.size());
-    m.kernel.multiply(mode.torques, padded(rows), mode.order + m.forces, read_coordinates(mode, s), nullptr,
-                      s.active);
-    std::fill(s.torque, s.torque + m.torques, 0.);
-    for (int r = 0; r < mode.row_count; ++r) s.torque[mode.rows[r]] = s.active[r];
+    m.kernel.multiply(mode.torques, padded(rows), mode.order + m.forces, s.f - mode.order, nullptr, s.active);
+    double* const torque = s.torque;
+    const double* const active = s.active;
+    std::fill(torque, torque + m.torques, 0.);
+    for (int r = 0, count = mode.row_count; r < count; ++r) torque[mode.rows[r]] = active[r];
 }
 
 double* read_coordinates(const Mode& mode, const Sample& s) SHIFTRIG_REALTIME {
     double* q = s.f - mode.order;
-    for (int i = 0; i < mode.order; ++i) q[i] = s.z[mode.coordinates[i]];
+    const double* const z = s.z;
+    for (int i = 0, order = mode.order; i < order; ++i) q[i] = z[mode.coordinates[i]];
     return q;
 }
 
-void show(const ModelData& m, const Mode& mode, const double* q, Sample& s) SHIFTRIG_REALTIME {
-    m.kernel.multiply(mode.view, padded(m.seen), mode.order, q, nullptr, s.z);
+void show(const ModelData& m, const Mode& mode, const double* q, Sample& s, int rows) SHIFTRIG_REALTIME {
+    m.kernel.multiply(mode.view, rows, mode.order, q, nullptr, s.slip);
 }
 
 void look(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     if (mode.tree) return tree_slips(m, mode, s);
-    show(m, mode, read_coordinates(mode, s), s);
+    show(m, mode, read_coordinates(mode, s), s, padded(m.seen));
 }
 
 }  // namespace shiftrig::plant::detail

@@ -23,6 +23,9 @@ struct Work {
 // Inputs as they act: limited to their ranges, not-a-number taken as the initial value.
 void latch_inputs(Work& work, const Inputs& inputs) SHIFTRIG_REALTIME;
 
+// What the latched inputs say of each pair.
+void latch_commands(Work& work) SHIFTRIG_REALTIME;
+
 // Valves, pistons, pedals: advances their states over the step and leaves the course of every pair's load.
 void advance_actuation(Work& work) SHIFTRIG_REALTIME;
 // The loads at the present state of the actuators, for a look without a step.
@@ -40,23 +43,27 @@ double load_edge(const Work& work, int pair, double from, double until) SHIFTRIG
 // Does the pair carry anything at this instant, or from it on?
 bool is_pressed(const Work& work, int pair, const Instant& at) SHIFTRIG_REALTIME;
 
-// From z and the auxiliary states of the sample, with the contact states `contact`: capacities, forces f,
-// auxiliary rates and powers.
-// Inside a step nobody asks what locked pairs could hold: `moving_pairs` leaves them out.
-enum class Extent { all_pairs, moving_pairs };
-void evaluate_forces(const Work& work, const unsigned char* contact, Sample& sample,
-                     Extent extent = Extent::all_pairs) SHIFTRIG_REALTIME;
+// From the slips and the auxiliary states of the sample, with the contact states `contact`: capacities, forces f,
+// auxiliary rates.
+void evaluate_forces(const Work& work, const unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;
+
+// The same while a part of a step is under way, where nobody asks what pairs could hold or pass: forces f and
+// auxiliary rates alone, of the pairs that list_passing_pairs() found when the part began.
+void list_passing_pairs(Work& work) SHIFTRIG_REALTIME;
+void stage_forces(const Work& work, Sample& sample) SHIFTRIG_REALTIME;
 
 // The part of f that depends on the contact states, from capacities already there.
 void contact_forces(const Work& work, const unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;
 
 // [Algin] eq. (15): M of the active set in `mode` from z and f of the sample.
 void internal_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+// The same where the coordinates stand before f already.
+void active_torques(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
 // The coordinates of the mode, read out of z into their place before f.
 double* read_coordinates(const Mode& mode, const Sample& sample) SHIFTRIG_REALTIME;
-// z and all slips of the sample from coordinates.
-void show(const ModelData& model, const Mode& mode, const double* coordinates, Sample& sample) SHIFTRIG_REALTIME;
+// From coordinates, so many rows of the view: ModelData::law_rows, power_rows or all of them.
+void show(const ModelData& model, const Mode& mode, const double* coordinates, Sample& sample, int rows) SHIFTRIG_REALTIME;
 // The same from the sample's own z, which comes to lie on the constraints of the mode.
 void look(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 

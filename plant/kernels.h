@@ -6,12 +6,23 @@
 // Columns are dealt to four running sums by c % 4, added at the end as (s0 + s1) + (s2 + s3).
 #pragma once
 
+#include <vector>
+
 #include "plant/plant.h"
 
 namespace shiftrig::plant::detail {
 
 constexpr int panel_rows = 8;
 constexpr int padded(int rows) noexcept { return (rows + 3) / 4 * 4; }
+constexpr int whole_panels(int rows) noexcept { return (rows + panel_rows - 1) / panel_rows * panel_rows; }
+
+// Memory of doubles that begins on a cache line: a panel's rows then lie in one line each, and a load of eight does
+// not cost two.
+struct alignas(64) CacheLine {
+    double value[panel_rows];
+};
+using AlignedDoubles = std::vector<CacheLine>;
+inline AlignedDoubles aligned_doubles(std::size_t count) { return AlignedDoubles((count + panel_rows - 1) / panel_rows); }
 // Doubles that a panel takes.
 constexpr int panel_size(int rows, int columns) noexcept { return padded(rows) * columns; }
 

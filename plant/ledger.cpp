@@ -9,48 +9,91 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-// Loss in meshes and their bearings at a sample [W].
-double mesh_losses(const ModelData& m, const Mode& mode, const Sample& s) {
-    double power = 0;
-    for (int k = 0; k < m.meshes; ++k) power += mode.loss_share[k] * s.torque[m.pairs + k] * s.turning[k];
-    for (int k = m.pairs; k < m.first_external; ++k) power += s.f[k] * s.slip[k];
-    return power;
-}
+// What the machine loses at an instant, and what it is given [W].
+struct Powers {
+    double lost = 0, given = 0;
+};
 
-// Loss in dampers and in the damping of shafts [W].
-double damping_losses(const ModelData& m, const Mode& mode, const Sample& s) {
-    double power = 0;
-    const double* swing = s.swing;
-    int e = 0;
-    for (const Elastic& shaft : m.structure.shafts) {
-        if (is_shaft_closed(m, mode, e++)) power += shaft.damping * *swing * *swing;
-        ++swing;
+// Loss in meshes, from their torques.
+double mesh_losses(const ModelData& m, const Mode& mode, const double* mesh_torques, const double* turning) {
+    const double* const share = mode.loss_share;
+    double power[2] = {};
+    int k = 0;
+    for (const int count = m.meshes - 1; k < count; k += 2) {
+        power[0] += share[k] * mesh_torques[k] * turning[k];
+        power[1] += share[k + 1] * mesh_torques[k + 1] * turning[k + 1];
     }
-    for (const Elastic& damper : m.structure.dampers) power += damper.damping * *swing * *swing, ++swing;
+    if (k < m.meshes) power[0] += share[k] * mesh_torques[k] * turning[k];
+    return power[0] + power[1];
+}
+
+double damping_losses(const ModelData& m, const Mode& mode, const double* swing) {
+    double power = 0;
+    const auto count = static_cast<int>(m.swing_damping.size());
+    const double* damping = m.swing_damping.data();
+    for (int i = 0; i < count; ++i) power += damping[i] * swing[i] * swing[i];
+    for (const BacklashLaw& law : m.backlashes) {
+        if (is_shaft_closed(m, mode, law.shaft)) power += law.damping * swing[law.shaft] * swing[law.shaft];
+    }
     return power;
 }
 
-// The state half way, by the step's own weights with the force linear over its first half, with forces and
-// internal torques; returns the energy lost by damping [J].
-double fill_middle(Work& w, const Mode& mode) {
+// Lost between the masses of tyres and converters, with the forces of one sample and the motion of another.
+double field_losses(const ModelData& m, const Sample& forces, const double* slip) {
+    double power = 0;
+    for (std::size_t t = 0; t < m.tyres.size(); ++t) {
+        const TyreLaw& law = m.tyres[t];
+        power += forces.tyre_force[t] *
+                 (slip[law.body_force] - slip[law.wheel_force] * m.description.tyres[t].radius);
+    }
+    for (std::size_t c = 0; c < m.converters.size(); ++c) {
+        const ConverterLaw& law = m.converters[c];
+        power += forces.converter[2 * c + 1] * slip[law.turbine_force] - forces.converter[2 * c] * slip[law.pump_force];
+    }
+    return power;
+}
+
+// With the forces of one sample and the motion of another, as the step takes them. The heat of pairs is not in it.
+Powers powers(const ModelData& m, const Mode& mode, const Sample& forces, const Sample& motion,
+              const double* mesh_torques) {
+    const double field = field_losses(m, forces, motion.slip);
+    const double *const f = forces.f, *const slip = motion.slip;
+    double bearings = 0, external = 0;
+    int k = m.pairs;
+    for (const int end = m.first_external; k < end; ++k) bearings += f[k] * slip[k];
+    for (const int end = m.first_flank_force; k < end; ++k) external -= f[k] * slip[k];
+    // What tyres and converters lose goes through external forces: the rest of these is input.
+    return {field + bearings + mesh_losses(m, mode, mesh_torques, motion.turning), external + field};
+}
+
+void subtract(const double* a, const double* b, int count, double* __restrict difference) {
+    for (int i = 0; i < count; ++i) difference[i] = a[i] - b[i];
+}
+
+// Torques of the meshes at `s` if the forces were f: they are linear in them.
+void mesh_torques_with(Work& w, const Mode& mode, const Sample& s, const double* f, double* rows) {
+    const ModelData& m = w.model;
+    double* const change = w.scratch.vector_b;
+    subtract(f, s.f, m.forces, change);
+    const int count = padded(mode.row_count + static_cast<int>(m.translating.size()));
+    m.kernel.multiply(mode.force_torques, count, m.forces, change, s.active, rows);
+}
+
+// The motion half way: the step's own solution, which is exact for forces on the parabola through its three.
+void fill_middle(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
-    Sample &begin = s.begin, &middle = s.middle, &end = s.end;
-    const double h = end.at.time - begin.at.time;
-    double* change = s.vector_b.data();
-    for (int k = 0; k < m.forces; ++k) change[k] = s.half.f[k] - begin.f[k];
-    double* q = s.vector_a.data();
-    m.kernel.multiply(s.used.middle, padded(mode.order), m.forces, change, read_coordinates(mode, s.half), q);
-    show(m, mode, q, middle);
-    for (int i = 0; i < m.auxiliary; ++i) {
-        middle.auxiliary[i] = 0.5 * (begin.auxiliary[i] + end.auxiliary[i]) +
-                              h / 8 * (begin.auxiliary_rate[i] - end.auxiliary_rate[i]);
-    }
+    double* const change = s.vector_b;
+    subtract(s.half.f, s.begin.f, m.forces, change);
+    subtract(s.late.f, s.begin.f, m.forces, change + m.forces);
+    double* q = s.vector_a;
+    m.kernel.multiply(s.used.middle, padded(mode.order), 2 * m.forces, change, s.half.f - mode.order, q);
+    Sample& middle = s.middle;
+    show(m, mode, q, middle, m.power_rows);
+    std::copy(q, q + mode.order, middle.f - mode.order);
+    std::copy(s.half.f, s.half.f + m.forces, middle.f);
     middle.at = s.half.at;
-    evaluate_forces(w, w.contact, middle, Extent::moving_pairs);
-    internal_torques(w, mode, middle);
-    return h / 6 *
-           (damping_losses(m, mode, begin) + 4 * damping_losses(m, mode, middle) + damping_losses(m, mode, end));
+    active_torques(m, mode, middle);
 }
 
 // The parabola through the forces at start, middle and end with which the step was made, at the fraction s.
@@ -75,41 +118,45 @@ void book_finely(Work& w, const Mode& mode) {
     int parts = mode.ledger_parts;
     if (s.used.length != mode.step.length) {
         parts = ledger_parts(mode, h / w.h);
-        op = build_step_operators(m, mode, h / parts, s.ledger_memory.data(), s.workspace.data());
+        op = build_step_operators(m, mode, h / parts, s.ledger_memory.data()->value, s.workspace.data());
     }
     Sample& at = s.middle;
-    const int block = padded(mode.order);
-    double* const at_half = s.vector_a.data();  // the three blocks of `advance`, of which the last is the end
-    double* const forces = s.vector_c.data();
-    std::copy(s.begin.z, s.begin.z + m.states, at.z);
-    look(m, mode, at);
+    const int n = mode.order, block = padded(n);
+    double* const at_half = s.vector_a;  // the three blocks of `advance`, of which the last is the end
+    double* const at_end = at_half + 2 * block;
+    double* const forces = s.vector_c;
+    for (int i = 0; i < n; ++i) at_end[i] = s.begin.z[mode.coordinates[i]];
     double external_work = 0;
     for (int part = 0;; ++part) {
+        std::copy(at_end, at_end + n, at.f - n);
+        show(m, mode, at_end, at, m.power_rows);
         forces_at(s, m.forces, static_cast<double>(part) / parts, at.f);
+        active_torques(m, mode, at);
         const double weight = h / parts / 3 * (part == 0 || part == parts ? 1 : part % 2 ? 4 : 2);  // Simpson
-        internal_torques(w, mode, at);
-        double loss = mesh_losses(m, mode, at) + damping_losses(m, mode, at);
-        for (int k = 0; k < m.pairs; ++k) {
+        double loss = mesh_losses(m, mode, at.active + mode.first_mesh, at.turning) + damping_losses(m, mode, at.swing);
+        for (int k = 0; k < m.first_external; ++k) {
             const double power = at.f[k] * at.slip[k];
-            s.heat[static_cast<std::size_t>(k)] += weight * power;
+            if (k < m.pairs) s.heat[static_cast<std::size_t>(k)] += weight * power;
             loss += power;
         }
         s.dissipated += weight * loss;
         for (int k = m.first_external; k < m.first_flank_force; ++k) external_work -= weight * at.f[k] * at.slip[k];
         for (std::size_t i = 0; i < m.translating.size(); ++i) {
-            w.next[m.layout.distances + static_cast<int>(i)] += weight * at.z[m.translating[i]];
+            w.next[m.layout.distances + static_cast<int>(i)] -= weight * at.slip[m.translating_force[i]];
+        }
+        if (2 * part == parts) {
+            const double field = field_losses(m, s.half, at.slip);
+            s.dissipated += 2 * h / 3 * field;
+            s.input_work += 2 * h / 3 * field;
         }
         if (part == parts) break;
-        m.kernel.multiply(op.from_begin, 3 * block, mode.order + m.forces, read_coordinates(mode, at),
-                          nullptr, at_half);
+        m.kernel.multiply(op.from_begin, 3 * block, n + m.forces, at.f - n, nullptr, at_half);
         forces_at(s, m.forces, (part + 0.5) / parts, forces);
         m.kernel.multiply(op.from_half, 2 * block, m.forces, forces, at_half + block, at_half + block);
         forces_at(s, m.forces, (part + 1.) / parts, forces);
-        m.kernel.multiply(op.from_late, block, m.forces, forces, at_half + 2 * block, at_half + 2 * block);
-        show(m, mode, at_half + 2 * block, at);
+        m.kernel.multiply(op.from_late, block, m.forces, forces, at_end, at_end);
     }
-    // What tyres and converters lose goes through external forces: the rest of these is input.
-    const double field = h / 6 * (s.begin.field_power + 4 * s.half.field_power + s.end.field_power);
+    const double field = h / 6 * (field_losses(m, s.begin, s.begin.slip) + field_losses(m, s.late, s.end.slip));
     s.dissipated += field;
     s.input_work += external_work + field;
 }
@@ -137,26 +184,49 @@ double stored_energy(const ModelData& m, const double* z, const unsigned char* c
 
 void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    Sample &begin = w.scratch.begin, &middle = w.scratch.middle, &end = w.scratch.end;
+    ScratchData& s = w.scratch;
+    const Sample &begin = s.begin, &middle = s.middle, &end = s.end;
     const double h = end.at.time - begin.at.time;
     if (!mode.tree && mode.ledger_parts > 1 && ledger_parts(mode, h / w.h) > 2) return book_finely(w, mode);
-    w.scratch.dissipated += mode.tree ? tree_middle(w, mode) : fill_middle(w, mode);
 
-    const auto simpson = [h](double a, double b, double c) { return h / 6 * (a + 4 * b + c); };
-    double heat_of_all = 0;
-    for (int k = 0; k < m.pairs; ++k) {
-        const double heat =
-            simpson(begin.f[k] * begin.slip[k], middle.f[k] * middle.slip[k], end.f[k] * end.slip[k]);
-        w.scratch.heat[static_cast<std::size_t>(k)] += heat;
-        heat_of_all += heat;
+    // The forces with which the step was made act on the motion that it found: what they do is then what it did.
+    const Sample* forces[3] = {&begin, &s.half, &s.late};
+    const double* torques[3];
+    double damping;
+    if (mode.tree) {
+        damping = tree_middle(w, mode);
+        forces[1] = &middle;
+        forces[2] = &end;
+        const Sample* const samples[3] = {&begin, &middle, &end};
+        for (int i = 0; i < 3; ++i) torques[i] = samples[i]->torque + m.pairs;
+    } else {
+        fill_middle(w, mode);
+        damping = h / 6 * (damping_losses(m, mode, begin.swing) + 4 * damping_losses(m, mode, middle.swing) + damping_losses(m, mode, end.swing));
+        double* last = s.vector_c;
+        mesh_torques_with(w, mode, end, s.late.f, last);
+        torques[0] = begin.torque + m.pairs;
+        torques[1] = middle.active + mode.first_mesh;
+        torques[2] = last + mode.first_mesh;
     }
-    w.scratch.dissipated += heat_of_all + simpson(begin.field_power + mesh_losses(m, mode, begin),
-                                                  middle.field_power + mesh_losses(m, mode, middle),
-                                                  end.field_power + mesh_losses(m, mode, end));
-    w.scratch.input_work += simpson(begin.input_power, middle.input_power, end.input_power);
+    const Powers first = powers(m, mode, *forces[0], begin, torques[0]);
+    const Powers half = powers(m, mode, *forces[1], middle, torques[1]);
+    const Powers last = powers(m, mode, *forces[2], end, torques[2]);
+    const double sixth = h / 6;
+    const auto simpson = [sixth](double a, double b, double c) { return sixth * (a + 4 * b + c); };
+    double* __restrict heat = s.vector_b;  // of the pairs in this part
+    for (int k = 0, pairs = m.pairs; k < pairs; ++k) {
+        heat[k] = simpson(forces[0]->f[k] * begin.slip[k], forces[1]->f[k] * middle.slip[k], forces[2]->f[k] * end.slip[k]);
+    }
+    double heat_of_all = 0;
+    for (int k = 0, pairs = m.pairs; k < pairs; ++k) {
+        s.heat[static_cast<std::size_t>(k)] += heat[k];
+        heat_of_all += heat[k];
+    }
+    s.dissipated += damping + heat_of_all + simpson(first.lost, half.lost, last.lost);
+    s.input_work += simpson(first.given, half.given, last.given);
     for (std::size_t i = 0; i < m.translating.size(); ++i) {
-        const int j = m.translating[i];
-        w.next[m.layout.distances + static_cast<int>(i)] += simpson(begin.z[j], middle.z[j], end.z[j]);
+        const int k = m.translating_force[i];
+        w.next[m.layout.distances + static_cast<int>(i)] -= simpson(begin.slip[k], middle.slip[k], end.slip[k]);
     }
 }
 

@@ -77,6 +77,21 @@ void set_loss_shares(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     }
 }
 
+void list_row_links(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
+    for (int r = 0; r < mode.row_count; ++r) {
+        const int unknown = mode.rows[r];
+        std::array<Link, 3>& links = mode.row_links[r];
+        const auto take = [&](const std::array<Link, 2>& two) { links = {two[0], two[1], Link{0, 0}}; };
+        if (unknown < m.pairs) {
+            take(m.pair_slip[static_cast<std::size_t>(unknown)]);
+        } else if (unknown < m.pairs + m.meshes) {
+            links = m.mesh_slip[static_cast<std::size_t>(unknown - m.pairs)];
+        } else {
+            take(m.mesh_motion[static_cast<std::size_t>(unknown - m.pairs - m.meshes)]);
+        }
+    }
+}
+
 ModeSizes::ModeSizes(const ModelData& m) {
     basis = m.masses * m.masses;
     mobility = panel_size(m.masses, m.masses);
@@ -84,8 +99,9 @@ ModeSizes::ModeSizes(const ModelData& m) {
     view = panel_size(m.seen, m.states);
     rates = panel_size(m.states, m.columns);
     torques = panel_size(m.torques + translating, m.columns);
+    force_torques = panel_size(m.torques + translating, m.forces);
     balance = panel_size(m.torques, m.columns + m.torques);
-    operators = m.states_padded * (3 * m.columns + 4 * m.forces);  // of one length
+    operators = m.states_padded * (3 * m.columns + 5 * m.forces) + 4 * panel_rows;  // of one length
     key = (m.contact_bytes + 7) / 8 * 8;
 }
 
@@ -108,7 +124,7 @@ int workspace_doubles(const ModelData& m) noexcept {
                      + padded(n) * n        // B
                      + 4 * (m.states_padded + m.torques) + m.states_padded * m.columns +
                      padded(m.torques) * m.columns + coordinates_workspace(m);
-    const int exponential = 16 * square + 3 * m.states_padded * (m.columns + 4 * m.forces);
+    const int exponential = 16 * square + 3 * m.states_padded * (m.columns + 5 * m.forces);
     return std::max(mode, exponential) + 64;
 }
 
@@ -126,6 +142,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
     for (int k = 0; k < m.pairs; ++k) {
         if (mode.key[k]) mode.rows[mode.row_count++] = k;
     }
+    mode.first_mesh = mode.row_count;
     for (int k = 0; k < m.meshes; ++k) mode.rows[mode.row_count++] = m.pairs + k;
     for (int r = 0; r < mode.row_count; ++r) {
         const int unknown = mode.rows[r];

@@ -134,6 +134,12 @@ void build_laws(ModelData& m) {
         if (law.heat) law.temperature = 2 * heated++;
         law.sliding_at_rest = sliding_factor(law.friction, 0);
         if (law.source == LoadSource::waveform) m.depends_on_time = true;
+        const int k = static_cast<int>(m.pair_laws.size());
+        if (law.hydraulic) m.hydraulic_pairs.push_back(k);
+        if (law.source == LoadSource::release || law.source == LoadSource::apply) m.pedal_pairs.push_back(k);
+        if (law.source == LoadSource::waveform) m.waveform_pairs.push_back(k);
+        if (law.heat) m.heated_pairs.push_back(k);
+        if (law.source < LoadSource::rolling) m.actuated_pairs = k + 1;
         m.pair_laws.push_back(law);
     }
     m.layout.actuators = actuator_slots;  // sizes for now, offsets in build_layout
@@ -141,17 +147,21 @@ void build_laws(ModelData& m) {
 
     if (!d.engines.empty()) m.throttle = add_input(m, "driver.throttle", Unit::one, 0, 0, 1, "sets the engine's no-load speed");
     for (const BrixiusTyre& tyre : d.tyres) {
-        m.tyres.push_back({s.mass(tyre.wheel), s.mass(tyre.body),
-                           add_input(m, "environment.mobility_number", Unit::one, tyre.mobility_number, 1, 1e4, "Brixius number of the soil"),
-                           s.pair(tyre.body + ".resistance")});
+        TyreLaw law;
+        law.wheel = s.mass(tyre.wheel);
+        law.body = s.mass(tyre.body);
+        law.mobility = add_input(m, "environment.mobility_number", Unit::one, tyre.mobility_number, 1, 1e4, "Brixius number of the soil");
+        law.resistance = s.pair(tyre.body + ".resistance");
+        m.tyres.push_back(law);
     }
-    for (const TorqueConverter& c : d.converters) m.converters.push_back({s.mass(c.pump), s.mass(c.turbine)});
+    for (const TorqueConverter& c : d.converters) m.converters.push_back({s.mass(c.pump), s.mass(c.turbine), -1, -1});
     for (const Engine& e : d.engines) {
         const std::string prefix = "engine." + e.name + ".";
         EngineLaw law;
         law.mass = s.mass(e.mass);
         law.pair = s.pair(e.name + ".friction");
         law.peak = largest_value(e.full_load);
+        law.full_load = Curve(e.full_load);
         law.start = add_switch(m, prefix + "start", "rising edge starts a stalled engine");
         law.speed_request_enable = add_switch(m, prefix + "speed_request_enable", "1: hold the speed request");
         law.speed_request = add_input(m, prefix + "speed_request", Unit::radian_per_second, 0, 0, 1e4, "speed control");
@@ -160,7 +170,8 @@ void build_laws(ModelData& m) {
         m.engines.push_back(law);
     }
     for (const TorqueSource& source : d.sources) {
-        SourceLaw law{s.mass(source.mass), -1};
+        SourceLaw law;
+        law.mass = s.mass(source.mass);
         if (source.input) law.input = add_input(m, "source." + source.name + ".torque", Unit::newton_metre, 0, -1e9, 1e9, "test-bench torque");
         add_breakpoints(m, source.waveform);
         if (!source.waveform.pieces.empty()) m.depends_on_time = true;
@@ -260,7 +271,23 @@ void build_sizes(ModelData& m) {
     }
     for (const EngineLaw& engine : m.engines) external(engine.mass);
     for (const SourceLaw& source : m.sources) external(source.mass);
-    for (int body : m.road_mass) external(body);
+    for (const auto* masses : {&m.road_mass, &m.plough_mass, &m.translating}) {
+        for (int mass : *masses) external(mass);
+    }
+    const auto force_on = [&m](int mass) { return m.external_force[static_cast<std::size_t>(mass)]; };
+    for (TyreLaw& tyre : m.tyres) {
+        tyre.wheel_force = force_on(tyre.wheel);
+        tyre.body_force = force_on(tyre.body);
+    }
+    for (ConverterLaw& converter : m.converters) {
+        converter.pump_force = force_on(converter.pump);
+        converter.turbine_force = force_on(converter.turbine);
+    }
+    for (EngineLaw& engine : m.engines) engine.force = force_on(engine.mass);
+    for (SourceLaw& source : m.sources) source.force = force_on(source.mass);
+    for (int mass : m.road_mass) m.road_force.push_back(force_on(mass));
+    for (int mass : m.plough_mass) m.plough_force.push_back(force_on(mass));
+    for (int mass : m.translating) m.translating_force.push_back(force_on(mass));
     m.first_flank_force = static_cast<int>(m.force_columns.size());
     for (int e = m.plain_shafts; e < m.twists; ++e) {
         const Elastic& shaft = s.shafts[static_cast<std::size_t>(e)];
@@ -271,7 +298,16 @@ void build_sizes(ModelData& m) {
     m.forces = static_cast<int>(m.force_columns.size());
     for (const auto& links : m.force_columns) m.force_on.push_back(branchless(links));
     m.columns = m.states + m.forces;
-    m.seen = m.columns + m.meshes + m.twists + static_cast<int>(s.dampers.size());
+    m.law_rows = whole_panels(m.forces);
+    m.power_rows = m.law_rows + whole_panels(m.meshes + m.twists + static_cast<int>(s.dampers.size()));
+    m.seen = m.power_rows + m.states;
+    for (const auto* elastics : {&s.shafts, &s.dampers}) {
+        for (const Elastic& elastic : *elastics) m.swing_damping.push_back(elastic.gap > 0 ? 0 : elastic.damping);
+    }
+    for (const PairLaw& law : m.pair_laws) {
+        m.static_factor.push_back(law.friction.static_factor);
+        m.sliding_at_rest.push_back(law.sliding_at_rest);
+    }
 }
 
 // A contact of flanks can be as short as half a period of the lightest motion they allow. The parts of a step have to

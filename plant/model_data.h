@@ -13,6 +13,7 @@
 #include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/lag.h"
+#include "plant/math/table.h"
 #include "plant/plant.h"
 #include "plant/state_layout.h"
 #include "plant/structure.h"
@@ -41,20 +42,26 @@ struct PairLaw {
     HeatOperator heat_operator;
 };
 
+// Where a law acts on a mass: as f[force], with −slip[force] as the speed of the mass.
 struct TyreLaw {
     int wheel = -1, body = -1, mobility = -1;
+    int wheel_force = -1, body_force = -1;
     int resistance = -1;  // friction pair of the body
 };
 struct ConverterLaw {
     int pump = -1, turbine = -1;
+    int pump_force = -1, turbine_force = -1;
 };
 struct EngineLaw {
     int mass = -1, pair = -1;
+    int force = -1;
     double peak = 0;  // of the full-load curve [Nm]
+    Curve full_load;
     int start = -1, speed_request_enable = -1, speed_request = -1, torque_limit = -1, fuel_cut = -1;
 };
 struct SourceLaw {
     int mass = -1, input = -1;
+    int force = -1;
 };
 struct SensorLaw {
     int mass = -1;
@@ -82,7 +89,9 @@ struct ModelData {
     int first_flank_force = 0;            // where external torques end in f
     int plain_shafts = 0;                 // without play; those with it follow
     int columns = 0;                      // states + m, at most what an operator multiplies
-    int seen = 0;                         // what a view shows: z, slips of forces, meshes, shafts, dampers
+    // What a view shows: slips of forces; from `law_rows` on those of meshes, shafts and dampers; from `power_rows` on z.
+    // Both are whole panels, so that the first part alone (force laws), or the first two (powers), are products too.
+    int law_rows = 0, power_rows = 0, seen = 0;
     int torques = 0;                      // unknowns: pairs, meshes, losses of stuck meshes
     int auxiliary = 0;                    // tyre slips, engine torque and boost
     int contact_bytes = 0;                // pairs, meshes, flanks
@@ -100,18 +109,23 @@ struct ModelData {
     double noteworthy_torque = 0;         // 1 % of the weakest clutch: less is idling [Nm]
     std::vector<double> root_inertia;     // √J
     std::vector<double> energy_factor;    // by state: J/2, then k/2
-    std::vector<int> translating;         // masses
+    std::vector<int> translating, translating_force;  // masses
+    std::vector<double> swing_damping;    // of shafts, then dampers
+    std::vector<double> static_factor, sliding_at_rest;  // per pair: of its load [1]
     std::unique_ptr<TreeTopology> tree;   // of the engine for long chains; none: dense modes
 
     std::vector<PairLaw> pair_laws;
     std::vector<FreewheelLaw> freewheels;
     std::vector<BacklashLaw> backlashes;
+    std::vector<int> hydraulic_pairs, pedal_pairs, waveform_pairs;  // by what actuates them
+    std::vector<int> heated_pairs;
+    int actuated_pairs = 0;               // pairs before those that are loaded by nature (rolling, resistance, engine)
     std::vector<TyreLaw> tyres;
     std::vector<ConverterLaw> converters;
     std::vector<EngineLaw> engines;
     std::vector<SourceLaw> sources;
-    std::vector<int> road_mass;           // per road
-    std::vector<int> plough_mass, plough_pair;  // per plough: body, its resistance
+    std::vector<int> road_mass, road_force;  // per road
+    std::vector<int> plough_mass, plough_force, plough_pair;  // per plough: body, its force, its resistance
     std::vector<SensorLaw> sensors;
     std::vector<double> breakpoints;      // of all waveforms, sorted [s]
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "plant/contact.h"
+#include "plant/laws/sensor.h"
 #include "plant/model_data.h"
 #include "plant/samples.h"
 
@@ -33,7 +34,9 @@ struct Mode {
                                      // shaft with play 1 closed
     unsigned char* bound = nullptr;  // per pair and mesh: bits of Bound
     int* rows = nullptr;             // active torque row → unknown (pair, mesh, loss of mesh)
+    std::array<Link, 3>* row_links = nullptr;  // their kinematic columns
     int row_count = 0;
+    int first_mesh = 0;              // row of the first mesh: all meshes stand there, in their order
     int base_rank = 0;               // of locked pairs and meshes
     int rank = 0;                    // with stuck meshes
     bool redundant = false;          // more unknowns than independent rows: the split is not unique
@@ -48,6 +51,7 @@ struct Mode {
     double* rates = nullptr;         // [L S̃]             panels, states × (order + forces)
     double* torques = nullptr;       // [R_q R_f]         panels, (rows + translating) × (order + forces); the latter
                                      //                   are accelerations
+    double* force_torques = nullptr; // R_f alone              panels, rows + translating × forces
     double* balance = nullptr;       // C_Iᵀ J⁻¹ (M̃ − Ĉ M_R), in torques  panels, rows × (order + forces + rows)
     StepOperators step;              // for the model's step size
     int ledger_parts = 1;            // into how many parts the ledger divides a step: stiff shafts swing within it
@@ -63,11 +67,11 @@ inline bool is_shaft_closed(const ModelData& m, const Mode& mode, int shaft) noe
 
 // Room that a mode and its operators take, in doubles and ints.
 struct ModeSizes {
-    int basis = 0, view = 0, mobility = 0, rates = 0, torques = 0, balance = 0, operators = 0;
+    int basis = 0, view = 0, mobility = 0, rates = 0, torques = 0, force_torques = 0, balance = 0, operators = 0;
     int key = 0;  // bytes, a multiple of 8
     explicit ModeSizes(const ModelData& model);
     int doubles() const noexcept {
-        return basis + view + mobility + rates + torques + balance + 2 * operators;
+        return basis + view + mobility + rates + torques + force_torques + balance + 2 * operators;
     }
 };
 
@@ -85,6 +89,9 @@ int coordinates_workspace(const ModelData& model) noexcept;
 // Mode::loss_share from its key and bound bits.
 void set_loss_shares(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
 
+// Mode::row_links from its rows.
+void list_row_links(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
+
 // Everything of a mode but its step operators. `mode.key` is set by the caller.
 void build_mode(const ModelData& model, Mode& mode, double* workspace, int* integers) SHIFTRIG_REALTIME;
 
@@ -92,23 +99,36 @@ void build_mode(const ModelData& model, Mode& mode, double* workspace, int* inte
 StepOperators build_step_operators(const ModelData& model, const Mode& mode, double length, double* memory,
                                    double* workspace) SHIFTRIG_REALTIME;
 
+// What the inputs say of a pair, as long as they stay the same.
+struct PairCommand {
+    double target = 0;       // where its actuator goes: pressure [Pa], current [A] or share [1]
+    double scale = 1;        // leak: share of the chamber pressure that is left
+    bool fixed = false;      // stuck open or closed: its load is rest_loads' whatever the actuator does
+    bool valve_held = false; // the valve sticks
+};
+
 // The cache: a table of bounded size, least recently used goes.
 struct OperatorsData {
     explicit OperatorsData(const ModelData& model);
-    std::vector<double> memory;
+    AlignedDoubles memory;
     std::vector<unsigned char> bytes, keys;
     std::vector<int> integers, row_memory;
+    std::vector<std::array<Link, 3>> link_memory;
     std::vector<double> share_memory;
     std::vector<signed char> relation_memory;
     std::vector<Mode> modes;
     std::vector<TreeMode> trees;  // one per mode where the model has a tree
     std::vector<TreeMass> tree_masses;
     std::uint64_t clock = 0;
-    Mode* recent = nullptr;
+    Mode* recent = nullptr;                     // the last one found,
+    std::vector<unsigned char> recent_contact;  // for these contact states
     std::vector<unsigned char> wanted;  // key being looked up
     std::vector<std::uint64_t> hashes;  // of the modes' keys
     // Inputs as they act and what follows from them alone; kept as long as the inputs are the same bits.
     std::vector<double> raw_input, input;
+    std::vector<PairCommand> commands;
+    std::vector<double> rest_loads;    // per pair: its load where its actuator has arrived at the command [Nm]
+    std::vector<SensorFaults> sensor_faults;
     std::vector<TyreSoil> soils;
     std::vector<EngineInput> engine_inputs;
     std::vector<double> grade_forces;  // per road [N]
@@ -116,12 +136,12 @@ struct OperatorsData {
     bool inputs_known = false;
     // The samples a step begins and ends with. The end of one is the beginning of the next: carried over where
     // State and inputs prove to be those it was computed from.
-    std::vector<double> sample_memory;
+    AlignedDoubles sample_memory;
     Sample samples[2];
     int begin_sample = 0;
     bool carried = false;
-    std::vector<unsigned char> carried_contact;
-    std::vector<double> carried_modes;  // of the engines
+    std::vector<double> carried_motion;  // of the State block
+    double carried_energy = 0;           // stored in it [J]
 
     // Hydraulic operators by oil temperature, a pure function of it and h.
     double oil_temperature = 0;

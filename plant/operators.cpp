@@ -33,6 +33,7 @@ OperatorsData::OperatorsData(const ModelData& m) {
     const auto meshes = static_cast<std::size_t>(m.meshes);
     keys.assign(modes.size() * 2 * key_bytes, 0);
     row_memory.assign(modes.size() * (rows + states), 0);
+    link_memory.resize(modes.size() * rows);
     const std::size_t relations = meshes * static_cast<std::size_t>(m.tree ? 0 : m.contact_bytes);
     share_memory.assign(modes.size() * 2 * meshes, 0.);
     relation_memory.assign(modes.size() * relations, 0);
@@ -41,39 +42,44 @@ OperatorsData::OperatorsData(const ModelData& m) {
         modes[i].bound = modes[i].key + key_bytes;
         modes[i].rows = row_memory.data() + i * (rows + states);
         modes[i].coordinates = modes[i].rows + rows;
+        modes[i].row_links = link_memory.data() + i * rows;
         modes[i].loss_share = share_memory.data() + i * 2 * meshes;
         modes[i].family_mobility = modes[i].loss_share + meshes;
         modes[i].relations = relation_memory.data() + i * relations;
     }
     wanted.assign(key_bytes, 0);
+    recent_contact.assign(static_cast<std::size_t>(m.contact_bytes), 0);
     hashes.assign(modes.size(), 0);
     raw_input.assign(m.inputs.size(), 0.);
     input.assign(m.inputs.size(), 0.);
+    commands.resize(static_cast<std::size_t>(m.pairs));
+    rest_loads.assign(static_cast<std::size_t>(m.pairs), 0.);
+    sensor_faults.resize(m.sensors.size());
     soils.resize(m.tyres.size());
     engine_inputs.resize(m.engines.size());
     grade_forces.assign(m.road_mass.size(), 0.);
-    sample_memory.assign(2 * sample_size(m), 0.);
+    sample_memory = aligned_doubles(2 * sample_size(m));
     for (std::size_t i = 0; i < 2; ++i)
-        place_sample(m, samples[i], sample_memory.data() + i * sample_size(m));
-    carried_contact.assign(static_cast<std::size_t>(m.contact_bytes), 0);
-    carried_modes.assign(m.engines.size(), 0.);
+        place_sample(m, samples[i], sample_memory.data()->value + i * sample_size(m));
+    carried_motion.assign(static_cast<std::size_t>(m.layout.actuators - m.layout.speeds) + 3 * m.engines.size(), 0.);
     hydraulics.resize(static_cast<std::size_t>(m.pairs));
 }
 
 void OperatorsData::place_matrices(const ModelData& m) {
     const ModeSizes sizes(m);
-    const auto per_mode = static_cast<std::size_t>(sizes.doubles());
+    const auto per_mode = static_cast<std::size_t>(sizes.doubles() + 8 * panel_rows);
     const auto affordable = static_cast<int>(memory_budget / (8 * per_mode + 1));
     modes.resize(static_cast<std::size_t>(std::clamp(affordable, fewest_modes, most_modes)));
-    memory.assign(modes.size() * per_mode, 0.);
-    double* at = memory.data();
+    memory = aligned_doubles(modes.size() * per_mode);
+    double* at = memory.data()->value;
     for (Mode& mode : modes) {
-        const auto take = [&at](int doubles) { return std::exchange(at, at + doubles); };
+        const auto take = [&at](int doubles) { return std::exchange(at, at + whole_panels(doubles)); };
         mode.basis = take(sizes.basis);
         mode.view = take(sizes.view);
         mode.mobility = take(sizes.mobility);
         mode.rates = take(sizes.rates);
         mode.torques = take(sizes.torques);
+        mode.force_torques = take(sizes.force_torques);
         mode.balance = take(sizes.balance);
         mode.step_memory = take(sizes.operators);
         mode.ledger_memory = take(sizes.operators);
@@ -85,12 +91,12 @@ void OperatorsData::place_trees(const ModelData& m) {
     const TreeSizes sizes(m);
     modes.resize(fewest_modes);
     trees.resize(modes.size());
-    memory.assign(modes.size() * sizes.doubles, 0.);
+    memory = aligned_doubles(modes.size() * sizes.doubles);
     integers.assign(modes.size() * sizes.integers, 0);
     bytes.assign(modes.size() * sizes.bytes, 0);
     tree_masses.resize(modes.size() * sizes.masses);
     for (std::size_t i = 0; i < modes.size(); ++i) {
-        place_tree(m, trees[i], memory.data() + i * sizes.doubles, integers.data() + i * sizes.integers,
+        place_tree(m, trees[i], memory.data()->value + i * sizes.doubles, integers.data() + i * sizes.integers,
                    bytes.data() + i * sizes.bytes, tree_masses.data() + i * sizes.masses);
         modes[i].tree = &trees[i];
     }
@@ -99,6 +105,12 @@ void OperatorsData::place_trees(const ModelData& m) {
 Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* contact,
                 ScratchData& scratch) SHIFTRIG_REALTIME {
     ++o.lookups;
+    const auto contact_bytes = static_cast<std::size_t>(m.contact_bytes);
+    if (o.recent && std::memcmp(o.recent_contact.data(), contact, contact_bytes) == 0) {
+        o.recent->last_use = ++o.clock;
+        return *o.recent;
+    }
+    std::memcpy(o.recent_contact.data(), contact, contact_bytes);
     mode_key(m, contact, o.wanted.data());
     const std::size_t bytes = o.wanted.size();
     if (o.recent && std::memcmp(o.recent->key, o.wanted.data(), bytes) == 0) {
@@ -136,6 +148,7 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
                                                   scratch.workspace.data());
         }
     }
+    list_row_links(m, *oldest);
     oldest->last_use = ++o.clock;
     o.recent = oldest;
     return *oldest;

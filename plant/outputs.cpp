@@ -1,4 +1,6 @@
 // Output signals from the end of a step. The order of writing is the order in which model.cpp names them.
+#include <algorithm>
+
 #include "plant/finish.h"
 #include "plant/laws/plough.h"
 #include "plant/ledger.h"
@@ -6,6 +8,9 @@
 
 namespace shiftrig::plant::detail {
 namespace {
+
+// Of clutches, by PairState.
+constexpr double state_code[] = {0, 1, 1, 2};
 
 // Of a translating mass: those stand behind the torques of the mode's rows.
 double acceleration(Work& w, const Mode& mode, const Sample& s, std::size_t translating) {
@@ -24,25 +29,20 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
     double* next = w.outputs.value.data();
     const auto put = [&next](auto... values) { ((*next++ = values), ...); };
 
-    for (int j = 0; j < m.masses; ++j) put(speeds[j]);
-    for (std::size_t e = 0; e < static_cast<std::size_t>(m.plain_shafts); ++e) {
-        const Elastic& shaft = m.structure.shafts[e];
-        const double twist = speeds[static_cast<std::size_t>(m.masses) + e];
-        put(shaft.stiffness * twist + shaft.damping * slip_fast(m.shaft_rate[e], speeds), twist);
+    next = std::copy(speeds, speeds + m.masses, next);
+    const double* twist = speeds + m.masses;
+    for (std::size_t e = 0; e < static_cast<std::size_t>(m.plain_shafts); ++e, ++twist) {
+        const double rate = mode.tree ? slip_fast(m.shaft_rate[e], speeds) : s.swing[e];
+        put(m.structure.shafts[e].stiffness * *twist + m.swing_damping[e] * rate, *twist);
     }
-    for (int k = 0; k < m.pairs; ++k) {
+    const double* heat = block + m.layout.heat;
+    for (int k = 0; k < m.actuated_pairs; ++k, ++heat) {
         const auto i = static_cast<std::size_t>(k);
         const PairLaw& law = m.pair_laws[i];
-        if (law.source >= LoadSource::rolling) continue;
-        const double slip = slip_fast(m.pair_slip[i], speeds);
-        const unsigned char state = w.contact[k];
-        if (state == locked) {
-            put(s.torque[k], slip, s.sliding[k], 0., 0.);
-        } else {
-            put(s.f[k], slip, s.sliding[k], state == free_running ? 2. : 1., s.f[k] * slip);
-        }
-        put(block[m.layout.heat + k]);
-        if (law.hydraulic) put(chamber_pressure(block, law) * w.scratch.loads[i].scale);
+        const double force = s.f[k], slip = s.slip[k];
+        // Either the sliding force is zero or the internal torque.
+        put(force + s.torque[k], slip, s.sliding[k], state_code[w.contact[k]], force * slip, *heat);
+        if (law.hydraulic) put(chamber_pressure(block, law) * w.operators.commands[i].scale);
         if (law.heat) put(block[law.temperature]);
     }
     for (const FreewheelLaw& law : m.freewheels) {
@@ -54,30 +54,29 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
             state == locked ? 0. : torque * slip, block[m.layout.heat + k]);
     }
     for (const BacklashLaw& law : m.backlashes) {
-        const double side = flank_side(w.contact[law.device]), twist = speeds[m.masses + law.shaft];
+        const double side = flank_side(w.contact[law.device]), angle = speeds[m.masses + law.shaft];
         const double rate = slip_fast(m.shaft_rate[static_cast<std::size_t>(law.shaft)], speeds);
-        put(side == 0 ? 0. : flank_torque(law, side, twist, rate), twist, side);
+        put(side == 0 ? 0. : flank_torque(law, side, angle, rate), angle, side);
     }
     for (int k = 0; k < m.meshes; ++k) {
         const auto i = static_cast<std::size_t>(k);
         const Mesh& mesh = m.structure.meshes[i];
-        const unsigned char state = w.contact[m.pairs + k];
         const double torque = s.torque[m.pairs + k];
-        int x = state == stuck || mode.bound[m.pairs + k] ? 0 : loss_exponent(state);
+        int x = mode.bound[m.pairs + k] ? 0 : loss_exponent(w.contact[m.pairs + k]);
         if (mesh.planetary) {
             const double u = mesh.force_ratio(x), lost = s.torque[m.pairs + m.meshes + k];
             put(torque, -u * torque + mesh.ratio * lost, -(1 - u) * torque - mesh.ratio * lost);
         } else {
             put(torque);
         }
-        if (!mesh.lossy()) x = torque * slip_fast(m.mesh_motion[i], speeds) < 0 ? -1 : 1;
+        if (!m.lossy[i]) x = torque * slip_fast(m.mesh_motion[i], speeds) < 0 ? -1 : 1;
         put(static_cast<double>(x));
         if (!mesh.planetary) put(torque * speeds[mesh.first]);
     }
     for (std::size_t t = 0; t < m.tyres.size(); ++t) put(s.tyre_force[t], s.tyre_slip[t]);
     for (std::size_t c = 0; c < m.converters.size(); ++c) put(s.converter[2 * c], s.converter[2 * c + 1]);
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
-        const double full = full_load(m.description.engines[e], speeds[m.engines[e].mass]);
+        const double full = s.engine_full_load[e];
         const auto engine_mode = static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
         put(s.engine_torque[e], full > 0 ? s.engine_torque[e] / full : 0., engine_mode == EngineMode::stalled ? 1. : 0.);
     }
@@ -94,8 +93,7 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
     }
     for (std::size_t i = 0; i < m.sensors.size(); ++i) {
         const double* sensor = block + m.layout.sensors + 4 * static_cast<int>(i);
-        const int dropout = m.sensors[i].dropout;
-        put(w.operators.input[static_cast<std::size_t>(dropout)] > 0.5 ? 0. : sensor[3]);
+        put(w.operators.sensor_faults[i].dropout ? 0. : sensor[3]);
     }
     if (m.description.oil) put(w.operators.oil_temperature, w.operators.oil.viscosity);
 

@@ -29,14 +29,14 @@ bool is_coarse(const Work& w) SHIFTRIG_REALTIME {
         wrong = std::max(wrong, std::fabs(end.f[k] - late.f[k]));
     }
     if (wrong > force_tolerance * size) return true;
-    // Twists half way, exact and by the cubic through both ends: what lies between does not show at the ends.
+    // Twists (the last coordinates, just before f) half way, exact and by the cubic through both ends: what lies between does not show at the ends.
     const double h = end.at.time - begin.at.time;
     double hidden = 0;
     for (int e = 0; e < m.twists; ++e) {
         const auto& links = m.shaft_rate[static_cast<std::size_t>(e)];
         const int i = m.masses + e;
         const double cubic = 0.5 * (begin.z[i] + end.z[i]) + h / 8 * (slip_fast(links, begin.z) - slip_fast(links, end.z));
-        hidden = std::max(hidden, m.structure.shafts[static_cast<std::size_t>(e)].stiffness * std::fabs(half.z[i] - cubic));
+        hidden = std::max(hidden, m.structure.shafts[static_cast<std::size_t>(e)].stiffness * std::fabs(half.f[e - m.twists] - cubic));
     }
     return hidden > swing_tolerance * size;
 }

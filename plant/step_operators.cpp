@@ -56,9 +56,9 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
     StepOperators operators;
     operators.length = length;
     operators.from_begin = memory;
-    operators.from_half = operators.from_begin + 3 * stride * columns;
-    operators.from_late = operators.from_half + 2 * stride * m.forces;
-    operators.middle = operators.from_late + stride * m.forces;
+    operators.from_half = operators.from_begin + whole_panels(3 * stride * columns);
+    operators.from_late = operators.from_half + whole_panels(2 * stride * m.forces);
+    operators.middle = operators.from_late + whole_panels(stride * m.forces);
 
     double* next = workspace;
     const auto take = [&](int doubles) { return std::exchange(next, next + doubles); };
@@ -77,7 +77,7 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
     for (int i = 0; i < n; ++i) {
         double energy = 0;
         for (int j = 0; j < m.masses; ++j) {
-            const double ratio = mode.view[panel_index(padded(m.seen), n, j, i)];
+            const double ratio = mode.view[panel_index(padded(m.seen), n, m.power_rows + j, i)];
             energy += m.structure.inertia[static_cast<std::size_t>(j)] * ratio * ratio;
         }
         const int twist = mode.coordinates[i] - m.masses;
@@ -156,17 +156,23 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
     for (int k = 0; k < m.forces; ++k) {
         put(operators.from_begin, 3, 0, columns, n + k, product + k * stride, 0.5 * length);
     }
-    algebra.multiply(phi2, force, m.forces, product);
-    for (int k = 0; k < m.forces; ++k)
-        put(operators.middle, 1, 0, m.forces, k, product + k * stride, 0.5 * length);
-
-    double_step();
-    put_transition(1);
-    put_transition(2);
     double* q1 = take(stride * m.forces);
     double* q2 = take(stride * m.forces);
     double* q3 = take(stride * m.forces);
     double* sum = sigma + stride;
+    algebra.multiply(phi2, force, m.forces, q2);
+    algebra.multiply(phi3, force, m.forces, q3);
+    for (int k = 0; k < m.forces; ++k) {
+        const double *b = q2 + k * stride, *c = q3 + k * stride;
+        for (int i = 0; i < n; ++i) sum[i] = 2 * b[i] - 2 * c[i];
+        put(operators.middle, 1, 0, 2 * m.forces, k, sum, 0.5 * length);
+        for (int i = 0; i < n; ++i) sum[i] = c[i] - 0.5 * b[i];
+        put(operators.middle, 1, 0, 2 * m.forces, m.forces + k, sum, 0.5 * length);
+    }
+
+    double_step();
+    put_transition(1);
+    put_transition(2);
     algebra.multiply(phi1, force, m.forces, q1);
     algebra.multiply(phi2, force, m.forces, q2);
     algebra.multiply(phi3, force, m.forces, q3);

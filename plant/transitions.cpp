@@ -235,8 +235,8 @@ double reduced_motion(const Work& w, const Mode& mode, const Links& links, doubl
 // How every device would turn with mesh `leader`: ±1, or 0. Geometry of the mode alone, so it is found once.
 void relate(Work& w, const Mode& mode, int leader, signed char* relation) {
     const ModelData& m = w.model;
-    double* lead = w.scratch.vector_a.data();
-    double* member = w.scratch.vector_b.data();
+    double* lead = w.scratch.vector_a;
+    double* member = w.scratch.vector_b;
     const double mobility = mode.family_mobility[leader] = reduced_motion(w, mode, mesh_of(w, leader).motion(), lead);
     const auto related = [&](const std::array<Link, 2>& links) -> signed char {
         const double size = mobility > 0 ? reduced_motion(w, mode, links, member) : 0;
@@ -284,7 +284,7 @@ double release_drive(Work& w, const Mode& mode, int leader, Sample& s) {
     unsigned char* trial = scratch.trial.data();
     std::copy(s.torque, s.torque + m.torques, scratch.torque_copy.data());
     // To set it moving, the load must overcome what its pairs can hold, not what they pass on sliding.
-    double* sliding = scratch.vector_a.data();
+    double* sliding = scratch.vector_a;
     std::copy(s.sliding, s.sliding + m.pairs, sliding);
     for (int k = 0; k < m.pairs; ++k) {
         if (part[k] != 0) s.sliding[k] = std::max(s.sliding[k], s.holding[k]);
@@ -449,17 +449,30 @@ Twist twist_of(const ModelData& m, const BacklashLaw& law, const Sample& s) {
 }
 
 // In torque: what a closed flank still presses with, how far the nearer of two open ones is from pressing.
-double flank_margin(const Work& w, const BacklashLaw& law, const Sample& s) {
-    const auto [twist, rate] = twist_of(w.model, law, s);
+double flank_margin(const Work& w, const BacklashLaw& law, double twist, double rate) {
     const double side = flank_side(w.contact[law.device]);
     if (side != 0) return closed_margin(law, side, twist, rate);
     return std::min(open_margin(law, 1, twist, rate), open_margin(law, -1, twist, rate));
 }
 
+double flank_margin(const Work& w, const BacklashLaw& law, const Sample& s) {
+    const auto [twist, rate] = twist_of(w.model, law, s);
+    return flank_margin(w, law, twist, rate);
+}
+
+// The same half way through a part, of which only coordinates and slips are there.
+double flank_margin_half_way(const Work& w, const BacklashLaw& law) {
+    const Sample& half = w.scratch.half;
+    const double twist = half.f[law.shaft - w.model.twists], rate = half.slip[law.force];
+    return flank_margin(w, law, twist, rate);
+}
+
 // Not by rounding: a tooth at rest that touches without load stays as it is.
+bool is_flank_violated(const BacklashLaw& law, double margin) {
+    return margin < -1e-12 * (law.stiffness * law.half_gap + law.damping);
+}
 bool is_flank_violated(const Work& w, const BacklashLaw& law, const Sample& s) {
-    const double rounding = 1e-12 * (law.stiffness * law.half_gap + law.damping);
-    return flank_margin(w, law, s) < -rounding;
+    return is_flank_violated(law, flank_margin(w, law, s));
 }
 
 bool flanks_hold(const Work& w, const Sample& end) {
@@ -512,8 +525,8 @@ double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
         return energy;
     };
     const double before = kinetic_energy();
-    double* momentum = w.scratch.vector_a.data();
-    double* joined = w.scratch.vector_b.data();
+    double* momentum = w.scratch.vector_a;
+    double* joined = w.scratch.vector_b;
     for (int j = 0; j < m.masses; ++j) momentum[j] = m.structure.inertia[static_cast<std::size_t>(j)] * speeds[j];
     if (mode.tree) {
         tree_mobility(w, mode, momentum, joined);
@@ -532,7 +545,7 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
     const Sample& begin = w.scratch.begin;
     Sample& end = w.scratch.end;
     const double h = end.at.time - begin.at.time;
-    double* change = w.scratch.vector_c.data();  // of the speeds: first as if every mass were free
+    double* change = w.scratch.vector_c;  // of the speeds: first as if every mass were free
     double longest = 0;
     for (int k = 0; k < m.meshes; ++k) {
         unsigned char& state = w.contact[m.pairs + k];
@@ -626,10 +639,13 @@ namespace {
 // Is every state good until the end of the part? The usual answer, quickly; a no only sends us to look closely.
 bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
     const ModelData& m = w.model;
+    // Pairs that slip carry no internal torque, and the slip of locked ones has no sign.
+    double reserve = 0, forward = 0;  // the least of all, 0 if there is some everywhere
     for (int k = 0; k < m.pairs; ++k) {
-        const unsigned char state = w.contact[k];
-        if (state == locked ? std::fabs(end.torque[k]) > end.holding[k] : slip_sign(state) * end.slip[k] < 0) return false;
+        reserve = std::min(reserve, end.holding[k] - std::fabs(end.torque[k]));
+        forward = std::min(forward, slip_sign(w.contact[k]) * end.slip[k]);
     }
+    if (reserve < 0 || forward < 0) return false;
     for (int k = 0; k < m.meshes; ++k) {
         const unsigned char state = w.contact[m.pairs + k];
         if (!m.lossy[static_cast<std::size_t>(k)]) continue;
@@ -650,6 +666,14 @@ bool freewheels_hold(const Work& w, const Sample& end) {
 
 }  // namespace
 
+// What holds half way, and the internal torques there: a stage knows neither. Its coordinates (on a tree, everything but
+// the torques) are there.
+static void complete_half(Work& w, const Mode& mode) {
+    if (mode.tree) return internal_torques(w, mode, w.scratch.half);
+    evaluate_forces(w, w.contact, w.scratch.half);
+    active_torques(w.model, mode, w.scratch.half);
+}
+
 Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     w.scratch.turned = false;
@@ -661,7 +685,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         double theta;
         Change change = Change::state;
         if (k < m.pairs && w.contact[k] == locked) {
-            if (!middle_known) internal_torques(w, mode, w.scratch.half);
+            if (!middle_known) complete_half(w, mode);
             middle_known = true;
             const double g0 = margin(w, k, begin), gm = margin(w, k, w.scratch.half), g1 = margin(w, k, end);
             theta = g0 <= 0 ? 0 : parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
@@ -680,7 +704,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
     for (const BacklashLaw& law : m.backlashes) {
         if (!is_flank_violated(w, law, end)) continue;
         const double g0 = flank_margin(w, law, begin), g1 = flank_margin(w, law, end);
-        const double gm = flank_margin(w, law, w.scratch.half);
+        const double gm = flank_margin_half_way(w, law);
         const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
         if (first.device < 0 || theta < first.theta) first = {law.device, theta, Change::state};
     }
@@ -703,7 +727,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         if (mode.tree) continue;
         if (size == 0) size = torque_scale(w, end);
         if (g1 * loss_difference(mesh_of(w, k - m.pairs)) >= -small * size) continue;
-        if (!middle_known) internal_torques(w, mode, w.scratch.half);
+        if (!middle_known) complete_half(w, mode);
         middle_known = true;
         const double g0 = turning_margin(w, k, begin), gm = turning_margin(w, k, w.scratch.half);
         if (g0 <= 0) continue;  // just turned: it is within rounding of the point where both losses agree
@@ -715,7 +739,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
 
 bool hides_contact(const Work& w) SHIFTRIG_REALTIME {
     for (const BacklashLaw& law : w.model.backlashes) {
-        if (is_flank_violated(w, law, w.scratch.half) && !is_flank_violated(w, law, w.scratch.end)) return true;
+        if (is_flank_violated(law, flank_margin_half_way(w, law)) && !is_flank_violated(w, law, w.scratch.end)) return true;
     }
     return false;
 }

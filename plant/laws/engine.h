@@ -55,6 +55,13 @@ inline double full_load(const Engine& p, double speed) noexcept {
     return interpolate(p.full_load, p.fade_from) * ((speed - p.fade_to) / (p.fade_from - p.fade_to));
 }
 
+// The same from the curve made ready.
+inline double full_load(const Engine& p, const Curve& curve, double speed) noexcept {
+    if (speed >= p.fade_from) return curve.at(speed);
+    if (speed <= p.fade_to) return 0;
+    return curve.at(p.fade_from) * ((speed - p.fade_to) / (p.fade_from - p.fade_to));
+}
+
 inline double engine_friction(const Engine& p, double speed) noexcept {
     return p.friction_constant + p.friction_per_speed * std::fabs(speed);
 }
@@ -76,10 +83,10 @@ inline double torque_demand(const Engine& p, double peak, const EngineInput& inp
     return wanted < -friction ? -friction : wanted > upper ? upper : wanted;
 }
 
-// Derivatives while running; a lag of 0 gives 0 (engine_torque then takes the demand itself).
+// Derivatives while running; a lag of 0 gives 0 (engine_torque then takes the demand itself). `full` is the full load
+// at this speed.
 inline EngineState engine_rate(const Engine& p, double peak, const EngineInput& input,
-                               const EngineState& state, double speed) noexcept {
-    const double full = full_load(p, speed);
+                               const EngineState& state, double speed, double full) noexcept {
     EngineState rate;
     if (p.actuator_lag > 0)
         rate.torque =
@@ -97,11 +104,11 @@ inline double starter_torque(const Engine& p) noexcept {
 
 // Torque of the engine on its mass, without the friction device of the stalled one.
 inline double engine_torque(const Engine& p, double peak, const EngineInput& input, const EngineState& state,
-                            EngineMode mode, double speed) noexcept {
+                            EngineMode mode, double speed, double full) noexcept {
     if (mode == EngineMode::stalled) return 0;
     if (mode == EngineMode::cranking) return starter_torque(p);
     if (p.actuator_lag > 0) return state.torque;
-    return torque_demand(p, peak, input, speed, full_load(p, speed), state.boost);
+    return torque_demand(p, peak, input, speed, full, state.boost);
 }
 
 inline double stalled_friction_capacity(const Engine& p, EngineMode mode, double speed) noexcept {

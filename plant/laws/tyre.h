@@ -40,6 +40,21 @@ inline TyreSoil tyre_soil(const BrixiusTyre& p, double mobility_number) noexcept
             0.5 * p.weight / std::sqrt(mobility_number)};
 }
 
+// κ̇ and the slip s that the force sees.
+struct TyreMotion {
+    double rate = 0;  // [1/s]
+    double slip = 0;  // [1]
+};
+
+inline TyreMotion tyre_motion(const BrixiusTyre& p, double kappa, double wheel_speed, double body_speed) noexcept {
+    const double rim = wheel_speed * p.radius;
+    const double rolling = std::max(std::fabs(rim), std::fabs(body_speed));
+    const double rate = (rim - body_speed - rolling * kappa) / p.relaxation_length;
+    const double damping =
+        p.slip_damping_time * p.relaxation_length / (p.relaxation_length + p.slip_damping_time * rolling);
+    return {rate, kappa + damping * rate};
+}
+
 inline double tyre_slip_rate(const BrixiusTyre& p, double kappa, double wheel_speed,
                              double body_speed) noexcept {
     const double rim = wheel_speed * p.radius;
