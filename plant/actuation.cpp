@@ -74,8 +74,8 @@ bool is_quiet(const Work& w, int pair) noexcept {
     const PairLaw& law = w.model.pair_laws[i];
     const PairCommand& command = w.operators.commands[i];
     return !law.hydraulic->solenoid && !command.valve_held &&
-           is_quiet(*law.hydraulic, read_hydraulic(w.next + law.actuator), static_cast<std::size_t>(law.delay_slots),
-                    command.target);
+           is_quiet(*law.hydraulic, read_hydraulic(w.next + law.actuator),
+                    static_cast<std::size_t>(law.delay_slots), command.target);
 }
 
 }  // namespace
@@ -89,17 +89,27 @@ void latch_commands(Work& w) SHIFTRIG_REALTIME {
         double& load = w.operators.rest_loads[i];
         command.target = input(w, law.command);
         switch (law.source) {
-            case LoadSource::constant: load = load_from_engagement(law.friction, 1); break;
-            case LoadSource::waveform: load = 0; break;
+            case LoadSource::constant:
+                load = load_from_engagement(law.friction, 1);
+                break;
+            case LoadSource::waveform:
+                load = 0;
+                break;
             case LoadSource::input:
-            case LoadSource::apply: load = load_from_engagement(law.friction, command.target); break;
-            case LoadSource::release: load = load_from_engagement(law.friction, 1 - command.target); break;
+            case LoadSource::apply:
+                load = load_from_engagement(law.friction, command.target);
+                break;
+            case LoadSource::release:
+                load = load_from_engagement(law.friction, 1 - command.target);
+                break;
             case LoadSource::hydraulic:
                 command.scale = 1 - input(w, law.leak);
                 command.valve_held = input(w, law.valve_stuck) > 0.5;
                 load = load_from_pressure(law.friction, command.target * command.scale);
                 break;
-            default: load = law.full_load; continue;  // by nature, not by actuation
+            default:
+                load = law.full_load;
+                continue;  // by nature, not by actuation
         }
         // Faults that override the actuation: stuck open, stuck closed.
         const double fault = input(w, law.stuck);
@@ -142,14 +152,16 @@ void hold_actuation(Work& w) SHIFTRIG_REALTIME {
     std::fill(s.moves.begin(), s.moves.end(), static_cast<unsigned char>(0));
     s.moving_count = 0;
     for (const int k : m.hydraulic_pairs) {
-        s.held[static_cast<std::size_t>(k)] = held_load(w, k, chamber_pressure(w.state, m.pair_laws[static_cast<std::size_t>(k)]));
+        s.held[static_cast<std::size_t>(k)] =
+            held_load(w, k, chamber_pressure(w.state, m.pair_laws[static_cast<std::size_t>(k)]));
     }
     for (const int k : m.pedal_pairs) {
         const auto i = static_cast<std::size_t>(k);
         if (w.operators.commands[i].fixed) continue;
         const PairLaw& law = m.pair_laws[i];
         const double position = w.state[law.actuator];
-        s.held[i] = load_from_engagement(law.friction, law.source == LoadSource::release ? 1 - position : position);
+        s.held[i] =
+            load_from_engagement(law.friction, law.source == LoadSource::release ? 1 - position : position);
     }
     for (const int k : m.waveform_pairs) {
         if (!w.operators.commands[static_cast<std::size_t>(k)].fixed) let_move(s, k);
@@ -157,7 +169,7 @@ void hold_actuation(Work& w) SHIFTRIG_REALTIME {
 }
 
 double chamber_pressure(const double* block, const PairLaw& law) SHIFTRIG_REALTIME {
-    return read_hydraulic(block + law.actuator).chamber;
+    return block[law.actuator + chamber_slot];
 }
 
 double pair_load(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {

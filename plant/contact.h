@@ -20,8 +20,11 @@ constexpr unsigned char slipping(double sign) noexcept { return sign < 0 ? slips
 // A mesh without losses is always "moving, x = +1".
 enum MeshState : unsigned char { stuck = 0, moves = 1, moves_backward = 2, driven = 4 };
 
-constexpr double motion_sign(unsigned char mesh) noexcept { return mesh & moves_backward ? -1. : 1.; }
-constexpr int loss_exponent(unsigned char mesh) noexcept { return mesh == stuck ? 0 : mesh & driven ? -1 : 1; }
+constexpr double motion_sign(unsigned char mesh) noexcept { return 1. - (mesh & moves_backward); }
+constexpr int loss_exponent(unsigned char mesh) noexcept {
+    constexpr signed char exponents[] = {0, 1, 0, 1, 0, -1, 0, -1};
+    return exponents[mesh];
+}
 constexpr unsigned char moving(double sign, int x) noexcept {
     return static_cast<unsigned char>(moves | (sign < 0 ? moves_backward : 0) | (x < 0 ? driven : 0));
 }

@@ -24,7 +24,7 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
         s.used = build_step_operators(m, mode, h, s.operator_memory.data()->value, s.workspace.data());
     }
     const StepOperators& op = s.used;
-    const auto multiply = m.kernel.multiply;
+    const Kernel& kernel = m.kernel;
     const double middle = 0.5 * (begin.at.fraction + end_fraction);
     half.at = {w.start + middle * w.h, middle, Side::right};
     late.at = end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
@@ -36,21 +36,21 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     double* const at_half = s.vector_a;
     double* const at_late = at_half + block;
     double* const at_end = at_late + block;
-    multiply(op.from_begin, 3 * block, n + m.forces, read_coordinates(mode, begin), nullptr, at_half);
+    kernel.multiply(op.from_begin, 3 * block, n + m.forces, read_coordinates(mode, begin), nullptr, at_half);
     for (int i = 0; i < m.auxiliary; ++i)
         half.auxiliary[i] = begin.auxiliary[i] + 0.5 * h * begin.auxiliary_rate[i];
     std::copy(at_half, at_half + n, half.f - n);
     show(m, mode, at_half, half, m.law_rows);
     stage_forces(w, half);
 
-    multiply(op.from_half, 2 * block, m.forces, half.f, at_late, at_late);
+    kernel.multiply(op.from_half, 2 * block, m.forces, half.f, at_late, at_late);
     for (int i = 0; i < m.auxiliary; ++i) {
         late.auxiliary[i] = begin.auxiliary[i] + h * (2 * half.auxiliary_rate[i] - begin.auxiliary_rate[i]);
     }
     show(m, mode, at_late, late, m.law_rows);
     stage_forces(w, late);
 
-    multiply(op.from_late, block, m.forces, late.f, at_end, at_end);
+    kernel.multiply(op.from_late, block, m.forces, late.f, at_end, at_end);
     for (int i = 0; i < m.auxiliary; ++i) {
         end.auxiliary[i] =
             begin.auxiliary[i] +

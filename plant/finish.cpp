@@ -70,12 +70,14 @@ void advance_temperatures(Work& w) {
         double* at = w.next + law.temperature;
         HeatState state{at[0], at[1]};
         advance_heat(law.heat_operator, state, w.scratch.heat[static_cast<std::size_t>(k)] * per_step, oil);
-        const auto passes = [&](double limit) { return limit > 0 && at[0] < limit && state.surface >= limit; };
-        const double end = w.start + w.h;
-        if (passes(law.heat->warn_temperature))
-            log_event(w, EventKind::facing_warning, k, end, 0, 0, state.surface);
-        if (passes(law.heat->fail_temperature))
-            log_event(w, EventKind::facing_failure, k, end, 0, 0, state.surface);
+        if (state.surface > at[0]) {
+            const auto passes = [&](double limit) { return limit > 0 && at[0] < limit && state.surface >= limit; };
+            const double end = w.start + w.h;
+            if (passes(law.heat->warn_temperature))
+                log_event(w, EventKind::facing_warning, k, end, 0, 0, state.surface);
+            if (passes(law.heat->fail_temperature))
+                log_event(w, EventKind::facing_failure, k, end, 0, 0, state.surface);
+        }
         at[0] = state.surface;
         at[1] = state.bulk;
     }
@@ -124,27 +126,29 @@ void advance_sensors(Work& w, const double* end_speeds) {
     }
 }
 
-// max |v_i| of four running ones.
-double largest(const double* v, int count) {
-    double of[4] = {};
+// In four running sums.
+double sum_of_squares(const double* v, int count) {
+    double sums[4] = {};
     int i = 0;
     for (; i + 4 <= count; i += 4) {
-        for (int lane = 0; lane < 4; ++lane) of[lane] = std::max(of[lane], std::fabs(v[i + lane]));
+        for (int lane = 0; lane < 4; ++lane) sums[lane] += v[i + lane] * v[i + lane];
     }
-    for (; i < count; ++i) of[0] = std::max(of[0], std::fabs(v[i]));
-    return std::max(std::max(of[0], of[1]), std::max(of[2], of[3]));
+    for (int lane = 0; i < count; ++i, ++lane) sums[lane] += v[i] * v[i];
+    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
-// Residual of [Algin] eq. (15) at the sample, relative to the largest torque in it.
+// Residual of [Algin] eq. (15) at the sample, as a length, relative to that of all torques in it.
 double torque_residual(Work& w, const Mode& mode, const Sample& s) {
     const ModelData& m = w.model;
     if (mode.row_count == 0) return 0;
     const int columns = mode.order + m.forces + mode.row_count;
-    const double* terms = s.f - mode.order;  // q, f, M
+    double* terms = w.scratch.vector_b;  // q, f, M side by side
+    std::copy(s.f - mode.order, s.f + m.forces, terms);
+    std::copy(s.active, s.active + mode.row_count, terms + mode.order + m.forces);
     double* rest = w.scratch.vector_a;
     m.kernel.multiply(mode.balance, padded(mode.row_count), columns, terms, nullptr, rest);
-    const double scale = largest(terms + mode.order, m.forces + mode.row_count);
-    return scale > 0 ? largest(rest, mode.row_count) / scale : 0;
+    const double scale = sum_of_squares(terms + mode.order, m.forces + mode.row_count);
+    return scale > 0 ? std::sqrt(sum_of_squares(rest, mode.row_count) / scale) : 0;
 }
 
 double constraint_violation(const Mode& mode, const double* speeds) {
@@ -217,6 +221,8 @@ bool is_begun(const Work& w) SHIFTRIG_REALTIME {
     if (!w.operators.carried) return false;
     const ScratchData& scratch = w.scratch;
     const Sample& s = scratch.begin;
+    const auto count = static_cast<std::size_t>(w.model.actuated_pairs);
+    if (scratch.moving_count == 0) return std::memcmp(scratch.held.data(), s.load, count * sizeof(double)) == 0;
     for (int k = 0; k < w.model.actuated_pairs; ++k) {
         const auto i = static_cast<std::size_t>(k);
         if ((scratch.moves[i] ? pair_load(w, k, s.at) : scratch.held[i]) != s.load[k]) return false;

@@ -25,9 +25,10 @@ double open_drag(const Work& w, int k, const Sample& s) noexcept {
 void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
     const ModelData& m = w.model;
     const PairLaw* laws = m.pair_laws.data();
-    const double *const static_factor = m.static_factor.data(), *const sliding_at_rest = m.sliding_at_rest.data();
+    const double *const static_factor = m.static_factor.data(), *const sliding_at_rest =
+                                                                    m.sliding_at_rest.data();
     const double* const load = s.load;
-    double *__restrict holding = s.holding, *__restrict sliding = s.sliding;
+    double* __restrict holding = s.holding, * __restrict sliding = s.sliding;
     const int pairs = m.pairs;
     for (int k = 0; k < pairs; ++k) {
         holding[k] = load[k] * static_factor[k];
@@ -93,9 +94,10 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
     }
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
         const EngineLaw& engine = m.engines[e];
-        w.operators.engine_inputs[e] = {input(w, m.throttle), input(w, engine.speed_request_enable) > 0.5,
-                                        input(w, engine.speed_request), input(w, engine.torque_limit),
-                                        input(w, engine.fuel_cut) > 0.5};
+        const EngineInput in{input(w, m.throttle), input(w, engine.speed_request_enable) > 0.5,
+                             input(w, engine.speed_request), input(w, engine.torque_limit),
+                             input(w, engine.fuel_cut) > 0.5};
+        known.engine_settings[e] = engine_setting(m.description.engines[e], engine.peak, in);
     }
     for (std::size_t i = 0; i < m.road_mass.size(); ++i) {
         known.grade_forces[i] = grade_force(m.description.roads[i], input(w, m.grade), m.description.gravity);
@@ -142,10 +144,10 @@ void law_forces(const Work& w, Sample& s) noexcept {
         const double full = s.engine_full_load[e] = full_load(engine, law.full_load, speed);
         EngineState change;
         if (mode == EngineMode::running)
-            change = engine_rate(engine, law.peak, known.engine_inputs[e], state, speed, full);
+            change = engine_rate(engine, known.engine_settings[e], state, speed, full);
         rate[0] = change.torque;
         rate[1] = change.boost;
-        s.engine_torque[e] = engine_torque(engine, law.peak, known.engine_inputs[e], state, mode, speed, full);
+        s.engine_torque[e] = engine_torque(engine, known.engine_settings[e], state, mode, speed, full);
         s.f[law.force] += s.engine_torque[e];
         s.load[law.pair] = stalled_friction_capacity(engine, mode, speed);
     }

@@ -11,8 +11,8 @@ namespace shiftrig::plant::detail {
 struct Work {
     const ModelData& model;
     OperatorsData& operators;
-    const double* state;     // the State block
-    double* next;            // the same, to be written; null where one only looks
+    const double* state;  // the State block
+    double* next;         // the same, to be written; null where one only looks
     Outputs& outputs;
     ScratchData& scratch;
     unsigned char* contact;  // contact states in force, per pair and mesh
@@ -63,7 +63,8 @@ void active_torques(const ModelData& model, const Mode& mode, Sample& sample) SH
 // The coordinates of the mode, read out of z into their place before f.
 double* read_coordinates(const Mode& mode, const Sample& sample) SHIFTRIG_REALTIME;
 // From coordinates, so many rows of the view: ModelData::law_rows, power_rows or all of them.
-void show(const ModelData& model, const Mode& mode, const double* coordinates, Sample& sample, int rows) SHIFTRIG_REALTIME;
+void show(const ModelData& model, const Mode& mode, const double* coordinates, Sample& sample,
+          int rows) SHIFTRIG_REALTIME;
 // The same from the sample's own z, which comes to lie on the constraints of the mode.
 void look(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 

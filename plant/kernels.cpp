@@ -21,8 +21,6 @@ void multiply_panel(const double* p, int columns, const double* v, const double*
     }
 }
 
-}  // namespace
-
 void multiply_portable(const double* panel, int rows, int columns, const double* v, const double* y0,
                        double* y) SHIFTRIG_REALTIME {
     int r = 0;
@@ -30,6 +28,14 @@ void multiply_portable(const double* panel, int rows, int columns, const double*
         multiply_panel<panel_rows>(panel + r * columns, columns, v, y0 ? y0 + r : nullptr, y + r);
     }
     if (r < rows) multiply_panel<4>(panel + r * columns, columns, v, y0 ? y0 + r : nullptr, y + r);
+}
+
+}  // namespace
+
+Kernel portable_kernel() {
+    Kernel kernel{KernelKind::portable, "portable", {}};
+    for (Multiply& product : kernel.products) product = multiply_portable;
+    return kernel;
 }
 
 void to_panels(const double* matrix, int rows, int columns, double* panel) SHIFTRIG_REALTIME {
@@ -44,22 +50,21 @@ void to_panels(const double* matrix, int rows, int columns, double* panel) SHIFT
 }
 
 Kernel choose_kernel(KernelKind kind) {
-    const Kernel portable{KernelKind::portable, "portable", multiply_portable};
 #if defined(SHIFTRIG_X86_KERNELS)
     const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl");
     if (avx512 && (kind == KernelKind::avx512 || kind == KernelKind::automatic)) {
-        return {KernelKind::avx512, "avx512", multiply_avx512};
+        return avx512_kernel();
     }
     if (avx2 && (kind == KernelKind::avx2 || kind == KernelKind::automatic)) {
-        return {KernelKind::avx2, "avx2", multiply_avx2};
+        return avx2_kernel();
     }
 #endif
     if (kind == KernelKind::avx2 || kind == KernelKind::avx512) {
         throw ModelError("kernel", kind == KernelKind::avx2 ? "avx2" : "avx512", "",
                          "is not offered by this processor");
     }
-    return portable;
+    return portable_kernel();
 }
 
 }  // namespace shiftrig::plant::detail

@@ -13,8 +13,12 @@
 namespace shiftrig::plant::detail {
 
 constexpr int panel_rows = 8;
-constexpr int padded(int rows) noexcept { return (rows + 3) / 4 * 4; }
-constexpr int whole_panels(int rows) noexcept { return (rows + panel_rows - 1) / panel_rows * panel_rows; }
+constexpr int padded(int rows) noexcept {
+    return (rows + 3) / 4 * 4;
+}
+constexpr int whole_panels(int rows) noexcept {
+    return (rows + panel_rows - 1) / panel_rows * panel_rows;
+}
 
 // Memory of doubles that begins on a cache line: a panel's rows then lie in one line each, and a load of eight does
 // not cost two.
@@ -22,9 +26,13 @@ struct alignas(64) CacheLine {
     double value[panel_rows];
 };
 using AlignedDoubles = std::vector<CacheLine>;
-inline AlignedDoubles aligned_doubles(std::size_t count) { return AlignedDoubles((count + panel_rows - 1) / panel_rows); }
+inline AlignedDoubles aligned_doubles(std::size_t count) {
+    return AlignedDoubles((count + panel_rows - 1) / panel_rows);
+}
 // Doubles that a panel takes.
-constexpr int panel_size(int rows, int columns) noexcept { return padded(rows) * columns; }
+constexpr int panel_size(int rows, int columns) noexcept {
+    return padded(rows) * columns;
+}
 
 // Where element (r, c) of a matrix of `rows` (padded) rows stands.
 constexpr int panel_index(int rows, int columns, int r, int c) noexcept {
@@ -37,19 +45,28 @@ constexpr int panel_index(int rows, int columns, int r, int c) noexcept {
 using Multiply = void (*)(const double* panel, int rows, int columns, const double* v, const double* y0,
                           double* y) SHIFTRIG_REALTIME;
 
+// One implementation for each of the heights 4, 8, … 24, so that none has to ask, and one for all taller products.
+constexpr int short_products = 6;
 struct Kernel {
     KernelKind kind{};
     const char* name = "";
-    Multiply multiply = nullptr;
+    Multiply products[short_products + 1] = {};  // [rows / 4 − 1], the taller ones last
+
+    void multiply(const double* panel, int rows, int columns, const double* v, const double* y0,
+                  double* y) const SHIFTRIG_REALTIME {
+        if (rows <= 0) return;
+        products[(rows < 4 * short_products ? rows : 4 * (short_products + 1)) / 4 - 1](panel, rows, columns,
+                                                                                        v, y0, y);
+    }
 };
 
 // The best kernel this processor runs for `automatic`, otherwise the one asked for. Throws ModelError if
 // the processor or the build lacks it.
 Kernel choose_kernel(KernelKind kind);
 
-void multiply_portable(const double*, int, int, const double*, const double*, double*) SHIFTRIG_REALTIME;
-void multiply_avx2(const double*, int, int, const double*, const double*, double*) SHIFTRIG_REALTIME;
-void multiply_avx512(const double*, int, int, const double*, const double*, double*) SHIFTRIG_REALTIME;
+Kernel portable_kernel();
+Kernel avx2_kernel();
+Kernel avx512_kernel();
 
 // Column-major matrix (leading dimension padded(rows)) into panels.
 void to_panels(const double* matrix, int rows, int columns, double* panel) SHIFTRIG_REALTIME;

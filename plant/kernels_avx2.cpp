@@ -4,48 +4,62 @@
 #if defined(SHIFTRIG_X86_KERNELS)
 #include <immintrin.h>
 
+#include <utility>
+
 namespace shiftrig::plant::detail {
 namespace {
 
-// `count` registers of four rows side by side, `height` rows from one column to the next.
-template <int count, int height>
-inline void multiply_rows(const double* p, int columns, const double* v, const double* y0, double* y) {
-    __m256d sum[count][4];
-    for (int b = 0; b < count; ++b) {
-        for (int way = 0; way < 4; ++way) sum[b][way] = _mm256_setzero_pd();
-    }
-    const auto add = [&](int c, int way) {
-        const __m256d x = _mm256_broadcast_sd(v + c);
-        for (int b = 0; b < count; ++b) {
-            sum[b][way] = _mm256_fmadd_pd(_mm256_loadu_pd(p + c * height + 4 * b), x, sum[b][way]);
-        }
-    };
-    int c = 0;
-    for (; c + 4 <= columns; c += 4) {
-        add(c, 0);
-        add(c + 1, 1);
-        add(c + 2, 2);
-        add(c + 3, 3);
-    }
-    if (c < columns) add(c, 0);
-    if (c + 1 < columns) add(c + 1, 1);
-    if (c + 2 < columns) add(c + 2, 2);
-    for (int b = 0; b < count; ++b) {
-        __m256d total = _mm256_add_pd(_mm256_add_pd(sum[b][0], sum[b][1]), _mm256_add_pd(sum[b][2], sum[b][3]));
-        if (y0) total = _mm256_add_pd(_mm256_loadu_pd(y0 + 4 * b), total);
-        _mm256_storeu_pd(y + 4 * b, total);
-    }
+inline __m256d total_of(__m256d s0, __m256d s1, __m256d s2, __m256d s3) noexcept {
+    return _mm256_add_pd(_mm256_add_pd(s0, s1), _mm256_add_pd(s2, s3));
 }
+
+// Two registers: the upper and the lower four rows.
+struct Eight {
+    struct Sum {
+        __m256d upper = _mm256_setzero_pd(), lower = upper;
+    };
+    static constexpr int height = 8;
+    Sum s0, s1, s2, s3;
+
+    static void add(Sum& sum, const double* p, const double* v) noexcept {
+        const __m256d x = _mm256_broadcast_sd(v);
+        sum.upper = _mm256_fmadd_pd(_mm256_loadu_pd(p), x, sum.upper);
+        sum.lower = _mm256_fmadd_pd(_mm256_loadu_pd(p + 4), x, sum.lower);
+    }
+    void store(const double* y0, double* y) const noexcept {
+        __m256d upper = total_of(s0.upper, s1.upper, s2.upper, s3.upper);
+        __m256d lower = total_of(s0.lower, s1.lower, s2.lower, s3.lower);
+        if (y0) {
+            upper = _mm256_add_pd(_mm256_loadu_pd(y0), upper);
+            lower = _mm256_add_pd(_mm256_loadu_pd(y0 + 4), lower);
+        }
+        _mm256_storeu_pd(y, upper);
+        _mm256_storeu_pd(y + 4, lower);
+    }
+};
+
+struct Four {
+    static constexpr int height = 4;
+    __m256d s0 = _mm256_setzero_pd(), s1 = s0, s2 = s0, s3 = s0;
+
+    static void add(__m256d& sum, const double* p, const double* v) noexcept {
+        sum = _mm256_fmadd_pd(_mm256_loadu_pd(p), _mm256_broadcast_sd(v), sum);
+    }
+    void store(const double* y0, double* y) const noexcept {
+        __m256d total = total_of(s0, s1, s2, s3);
+        if (y0) total = _mm256_add_pd(_mm256_loadu_pd(y0), total);
+        _mm256_storeu_pd(y, total);
+    }
+};
+
+constexpr int most_panels = 1;
+
+#include "plant/kernels_body.h"
 
 }  // namespace
 
-void multiply_avx2(const double* panel, int rows, int columns, const double* v, const double* y0,
-                   double* y) SHIFTRIG_REALTIME {
-    int r = 0;
-    for (; r + panel_rows <= rows; r += panel_rows) {
-        multiply_rows<2, 8>(panel + r * columns, columns, v, y0 ? y0 + r : nullptr, y + r);
-    }
-    if (r < rows) multiply_rows<1, 4>(panel + r * columns, columns, v, y0 ? y0 + r : nullptr, y + r);
+Kernel avx2_kernel() {
+    return kernel_of(KernelKind::avx2, "avx2");
 }
 
 }  // namespace shiftrig::plant::detail

@@ -48,7 +48,8 @@ double field_losses(const ModelData& m, const Sample& forces, const double* slip
     }
     for (std::size_t c = 0; c < m.converters.size(); ++c) {
         const ConverterLaw& law = m.converters[c];
-        power += forces.converter[2 * c + 1] * slip[law.turbine_force] - forces.converter[2 * c] * slip[law.pump_force];
+        power += forces.converter[2 * c + 1] * slip[law.turbine_force] -
+                 forces.converter[2 * c] * slip[law.pump_force];
     }
     return power;
 }
@@ -133,7 +134,8 @@ void book_finely(Work& w, const Mode& mode) {
         forces_at(s, m.forces, static_cast<double>(part) / parts, at.f);
         active_torques(m, mode, at);
         const double weight = h / parts / 3 * (part == 0 || part == parts ? 1 : part % 2 ? 4 : 2);  // Simpson
-        double loss = mesh_losses(m, mode, at.active + mode.first_mesh, at.turning) + damping_losses(m, mode, at.swing);
+        double loss =
+            mesh_losses(m, mode, at.active + mode.first_mesh, at.turning) + damping_losses(m, mode, at.swing);
         for (int k = 0; k < m.first_external; ++k) {
             const double power = at.f[k] * at.slip[k];
             if (k < m.pairs) s.heat[static_cast<std::size_t>(k)] += weight * power;
@@ -156,7 +158,8 @@ void book_finely(Work& w, const Mode& mode) {
         forces_at(s, m.forces, (part + 1.) / parts, forces);
         m.kernel.multiply(op.from_late, block, m.forces, forces, at_end, at_end);
     }
-    const double field = h / 6 * (field_losses(m, s.begin, s.begin.slip) + field_losses(m, s.late, s.end.slip));
+    const double field =
+        h / 6 * (field_losses(m, s.begin, s.begin.slip) + field_losses(m, s.late, s.end.slip));
     s.dissipated += field;
     s.input_work += external_work + field;
 }
@@ -201,7 +204,9 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         for (int i = 0; i < 3; ++i) torques[i] = samples[i]->torque + m.pairs;
     } else {
         fill_middle(w, mode);
-        damping = h / 6 * (damping_losses(m, mode, begin.swing) + 4 * damping_losses(m, mode, middle.swing) + damping_losses(m, mode, end.swing));
+        damping = h / 6 *
+                  (damping_losses(m, mode, begin.swing) + 4 * damping_losses(m, mode, middle.swing) +
+                   damping_losses(m, mode, end.swing));
         double* last = s.vector_c;
         mesh_torques_with(w, mode, end, s.late.f, last);
         torques[0] = begin.torque + m.pairs;
@@ -215,7 +220,8 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const auto simpson = [sixth](double a, double b, double c) { return sixth * (a + 4 * b + c); };
     double* __restrict heat = s.vector_b;  // of the pairs in this part
     for (int k = 0, pairs = m.pairs; k < pairs; ++k) {
-        heat[k] = simpson(forces[0]->f[k] * begin.slip[k], forces[1]->f[k] * middle.slip[k], forces[2]->f[k] * end.slip[k]);
+        heat[k] = simpson(forces[0]->f[k] * begin.slip[k], forces[1]->f[k] * middle.slip[k],
+                          forces[2]->f[k] * end.slip[k]);
     }
     double heat_of_all = 0;
     for (int k = 0, pairs = m.pairs; k < pairs; ++k) {
@@ -226,7 +232,8 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     s.input_work += simpson(first.given, half.given, last.given);
     for (std::size_t i = 0; i < m.translating.size(); ++i) {
         const int k = m.translating_force[i];
-        w.next[m.layout.distances + static_cast<int>(i)] -= simpson(begin.slip[k], middle.slip[k], end.slip[k]);
+        w.next[m.layout.distances + static_cast<int>(i)] -=
+            simpson(begin.slip[k], middle.slip[k], end.slip[k]);
     }
 }
 

@@ -77,7 +77,13 @@ void set_loss_shares(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     }
 }
 
+static bool has_mesh_at_rest(const ModelData& m, const Mode& mode) {
+    return std::any_of(m.lossy_meshes.begin(), m.lossy_meshes.end(),
+                       [&](int k) { return mode.key[m.pairs + k] == 0 || mode.bound[m.pairs + k] != 0; });
+}
+
 void list_row_links(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
+    mode.rests = has_mesh_at_rest(m, mode);
     for (int r = 0; r < mode.row_count; ++r) {
         const int unknown = mode.rows[r];
         std::array<Link, 3>& links = mode.row_links[r];

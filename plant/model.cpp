@@ -237,6 +237,7 @@ void build_sizes(ModelData& m) {
     for (const Mesh& mesh : s.meshes) m.mesh_motion.push_back(branchless(mesh.motion()));
     for (const Mesh& mesh : s.meshes) {
         const double slope = mesh.forward_efficiency - 1 / mesh.backward_efficiency;
+        if (mesh.lossy()) m.lossy_meshes.push_back(static_cast<int>(m.lossy.size()));
         m.lossy.push_back(mesh.lossy());
         m.loss_kink.push_back(slope < 0 ? (mesh.forward_bearing - mesh.backward_bearing) / slope : mesh.forward_bearing / 2);
     }

@@ -102,6 +102,7 @@ struct ModelData {
     std::vector<std::array<Link, 2>> pair_slip, mesh_motion, mesh_loss, shaft_rate, damper_rate, force_on;
     std::vector<std::array<Link, 3>> mesh_slip;
     std::vector<unsigned char> lossy;     // per mesh
+    std::vector<int> lossy_meshes;
     std::vector<double> loss_kink;        // torque at which the loss lines of both directions cross, moving forward [Nm]
     bool depends_on_time = false;         // waveforms: forces are no function of state and inputs alone
     std::vector<int> bearing_force;       // per mesh, −1: none

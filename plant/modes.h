@@ -39,6 +39,7 @@ struct Mode {
     int first_mesh = 0;              // row of the first mesh: all meshes stand there, in their order
     int base_rank = 0;               // of locked pairs and meshes
     int rank = 0;                    // with stuck meshes
+    bool rests = false;              // some lossy mesh is at rest, stuck or bound
     bool redundant = false;          // more unknowns than independent rows: the split is not unique
     double* basis = nullptr;         // Q, masses × rank
     int order = 0;                   // number of coordinates
@@ -89,7 +90,7 @@ int coordinates_workspace(const ModelData& model) noexcept;
 // Mode::loss_share from its key and bound bits.
 void set_loss_shares(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
 
-// Mode::row_links from its rows.
+// Mode::row_links from its rows, and Mode::rests.
 void list_row_links(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
 
 // Everything of a mode but its step operators. `mode.key` is set by the caller.
@@ -130,7 +131,7 @@ struct OperatorsData {
     std::vector<double> rest_loads;    // per pair: its load where its actuator has arrived at the command [Nm]
     std::vector<SensorFaults> sensor_faults;
     std::vector<TyreSoil> soils;
-    std::vector<EngineInput> engine_inputs;
+    std::vector<EngineSetting> engine_settings;
     std::vector<double> grade_forces;  // per road [N]
     double draft = 1;                  // share of the plough in the ground
     bool inputs_known = false;

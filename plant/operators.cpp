@@ -56,12 +56,13 @@ OperatorsData::OperatorsData(const ModelData& m) {
     rest_loads.assign(static_cast<std::size_t>(m.pairs), 0.);
     sensor_faults.resize(m.sensors.size());
     soils.resize(m.tyres.size());
-    engine_inputs.resize(m.engines.size());
+    engine_settings.resize(m.engines.size());
     grade_forces.assign(m.road_mass.size(), 0.);
     sample_memory = aligned_doubles(2 * sample_size(m));
     for (std::size_t i = 0; i < 2; ++i)
         place_sample(m, samples[i], sample_memory.data()->value + i * sample_size(m));
-    carried_motion.assign(static_cast<std::size_t>(m.layout.actuators - m.layout.speeds) + 3 * m.engines.size(), 0.);
+    carried_motion.assign(
+        static_cast<std::size_t>(m.layout.actuators - m.layout.speeds) + 3 * m.engines.size(), 0.);
     hydraulics.resize(static_cast<std::size_t>(m.pairs));
 }
 
@@ -96,8 +97,9 @@ void OperatorsData::place_trees(const ModelData& m) {
     bytes.assign(modes.size() * sizes.bytes, 0);
     tree_masses.resize(modes.size() * sizes.masses);
     for (std::size_t i = 0; i < modes.size(); ++i) {
-        place_tree(m, trees[i], memory.data()->value + i * sizes.doubles, integers.data() + i * sizes.integers,
-                   bytes.data() + i * sizes.bytes, tree_masses.data() + i * sizes.masses);
+        place_tree(m, trees[i], memory.data()->value + i * sizes.doubles,
+                   integers.data() + i * sizes.integers, bytes.data() + i * sizes.bytes,
+                   tree_masses.data() + i * sizes.masses);
         modes[i].tree = &trees[i];
     }
 }

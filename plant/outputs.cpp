@@ -42,7 +42,7 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
         const double force = s.f[k], slip = s.slip[k];
         // Either the sliding force is zero or the internal torque.
         put(force + s.torque[k], slip, s.sliding[k], state_code[w.contact[k]], force * slip, *heat);
-        if (law.hydraulic) put(chamber_pressure(block, law) * w.operators.commands[i].scale);
+        if (law.hydraulic) put(block[law.actuator + chamber_slot] * w.operators.commands[i].scale);
         if (law.heat) put(block[law.temperature]);
     }
     for (const FreewheelLaw& law : m.freewheels) {
@@ -77,8 +77,10 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
     for (std::size_t c = 0; c < m.converters.size(); ++c) put(s.converter[2 * c], s.converter[2 * c + 1]);
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
         const double full = s.engine_full_load[e];
-        const auto engine_mode = static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
-        put(s.engine_torque[e], full > 0 ? s.engine_torque[e] / full : 0., engine_mode == EngineMode::stalled ? 1. : 0.);
+        const auto engine_mode =
+            static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
+        put(s.engine_torque[e], full > 0 ? s.engine_torque[e] / full : 0.,
+            engine_mode == EngineMode::stalled ? 1. : 0.);
     }
     for (std::size_t i = 0; i < m.translating.size(); ++i) {
         put(acceleration(w, mode, s, i), block[m.layout.distances + static_cast<int>(i)]);
@@ -101,8 +103,8 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
     const double* energy = block + m.layout.energy;
     put(energy[0], stored, energy[1], stored - energy[2] - energy[0] + energy[1]);
     const Certificate& c = w.outputs.certificate;
-    put(c.torque_residual, c.constraint_violation, c.energy_defect, double(c.events),
-        double(c.fall_backs), double(c.mode_lookups), double(c.mode_misses), double(c.flags));
+    put(c.torque_residual, c.constraint_violation, c.energy_defect, double(c.events), double(c.fall_backs),
+        double(c.mode_lookups), double(c.mode_misses), double(c.flags));
 }
 
 }  // namespace shiftrig::plant::detail

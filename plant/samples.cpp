@@ -13,8 +13,8 @@ std::size_t sample_size(const ModelData& m) {
     const auto translating = static_cast<int>(m.translating.size());
     const std::size_t doubles =
         static_cast<std::size_t>(whole_panels(m.seen) + whole_panels(m.torques + translating) +
-                                 whole_panels(m.states_padded) + m.states + m.forces + 2 * m.auxiliary + 3 * m.pairs +
-                                 m.torques) +
+                                 whole_panels(m.states_padded) + m.states + m.forces + 2 * m.auxiliary +
+                                 3 * m.pairs + m.torques) +
         2 * m.tyres.size() + 2 * m.converters.size() + 2 * m.engines.size();
     return (doubles + panel_rows - 1) / panel_rows * panel_rows;
 }
@@ -22,11 +22,13 @@ std::size_t sample_size(const ModelData& m) {
 void place_sample(const ModelData& m, Sample& s, double* memory) {
     const auto take = [&memory](std::size_t doubles) { return std::exchange(memory, memory + doubles); };
     const auto pairs = static_cast<std::size_t>(m.pairs), auxiliary = static_cast<std::size_t>(m.auxiliary);
-    s.slip = take(static_cast<std::size_t>(whole_panels(m.seen)));  // what products write begins on cache lines
+    s.slip =
+        take(static_cast<std::size_t>(whole_panels(m.seen)));  // what products write begins on cache lines
     s.turning = s.slip + m.law_rows;
     s.swing = s.turning + m.meshes;
     s.z = s.slip + m.power_rows;
-    s.active = take(static_cast<std::size_t>(whole_panels(m.torques + static_cast<int>(m.translating.size()))));
+    s.active =
+        take(static_cast<std::size_t>(whole_panels(m.torques + static_cast<int>(m.translating.size()))));
     s.rate = take(static_cast<std::size_t>(whole_panels(m.states_padded)));
     s.f = take(static_cast<std::size_t>(m.states + m.forces)) + m.states;
     s.auxiliary = take(auxiliary);
@@ -50,15 +52,16 @@ ScratchData::ScratchData(const ModelData& m) {
         place_sample(m, *samples[i], buffer.data()->value + i * size);
     loads.resize(static_cast<std::size_t>(m.pairs));
     held.assign(static_cast<std::size_t>(m.pairs), 0.);
-    for (auto* list : {&moving, &busy, &sliding, &dragging}) list->assign(static_cast<std::size_t>(m.pairs), 0);
+    for (auto* list : {&moving, &busy, &sliding, &dragging})
+        list->assign(static_cast<std::size_t>(m.pairs), 0);
     moves.assign(static_cast<std::size_t>(m.pairs), 0);
     engine_modes.resize(m.engines.size());
     const auto bytes = static_cast<std::size_t>(m.contact_bytes);
     for (auto* list : {&before, &trial, &release, &changed, &violations}) list->assign(bytes, 0);
     family.assign(bytes, 0);
-    const auto longest =
-        static_cast<std::size_t>(whole_panels(std::max({3 * m.states_padded, padded(m.torques), 3 * m.forces}) +
-                                              m.states_padded + m.columns + m.torques));
+    const auto longest = static_cast<std::size_t>(
+        whole_panels(std::max({3 * m.states_padded, padded(m.torques), 3 * m.forces}) + m.states_padded +
+                     m.columns + m.torques));
     vectors = aligned_doubles(3 * longest);
     vector_a = vectors.data()->value;
     vector_b = vector_a + longest;

@@ -22,24 +22,24 @@ struct Instant {
 struct Sample {
     Instant at;
     // What the mode's view shows of the coordinates q, in the order of View: a product fills all or the first of these.
-    double* slip = nullptr;      // per force: slip of pairs, of bearings in meshes, −ω of external torques
-    double* turning = nullptr;   // per mesh: what its loss torque acts on (ModelData::mesh_loss)
-    double* swing = nullptr;     // twist rate of each shaft, slip of each damper
-    double* z = nullptr;         // [ω; φ]
+    double* slip = nullptr;     // per force: slip of pairs, of bearings in meshes, −ω of external torques
+    double* turning = nullptr;  // per mesh: what its loss torque acts on (ModelData::mesh_loss)
+    double* swing = nullptr;    // twist rate of each shaft, slip of each damper
+    double* z = nullptr;        // [ω; φ]
     // What operators multiply: q ends where f begins (`coordinates`), f is followed by the torques of the mode's
     // active rows. A product that gives q comes before f is filled, since its padding reaches into it.
-    double* f = nullptr;         // forces
-    double* active = nullptr;    // torques in the order of Mode::rows, then accelerations of translating masses
+    double* f = nullptr;       // forces
+    double* active = nullptr;  // torques in the order of Mode::rows, then accelerations of translating masses
     double* auxiliary = nullptr;
     double* auxiliary_rate = nullptr;
-    double* load = nullptr;      // per pair: what presses it together [Nm]
-    double* sliding = nullptr;   // per pair: sliding capacity at its slip [Nm]
-    double* holding = nullptr;   // per pair: static capacity [Nm]
-    double* torque = nullptr;    // M of pairs, meshes, then loss torques of stuck meshes [Nm]
-    double* rate = nullptr;      // ż
-    double* tyre_force = nullptr;  // per tyre [N]
-    double* tyre_slip = nullptr;   // per tyre [1]
-    double* converter = nullptr;   // pump, turbine torque per converter [Nm]
+    double* load = nullptr;              // per pair: what presses it together [Nm]
+    double* sliding = nullptr;           // per pair: sliding capacity at its slip [Nm]
+    double* holding = nullptr;           // per pair: static capacity [Nm]
+    double* torque = nullptr;            // M of pairs, meshes, then loss torques of stuck meshes [Nm]
+    double* rate = nullptr;              // ż
+    double* tyre_force = nullptr;        // per tyre [N]
+    double* tyre_slip = nullptr;         // per tyre [1]
+    double* converter = nullptr;         // pump, turbine torque per converter [Nm]
     double* engine_torque = nullptr;     // per engine [Nm]
     double* engine_full_load = nullptr;  // at its speed [Nm]
 };
@@ -63,7 +63,8 @@ struct StepOperators {
     double* from_begin = nullptr;  // [P_h Q_h; P −Q_1; P Q_1−3Q_2+4Q_3]   three blocks × (order + forces)
     double* from_half = nullptr;   // [2Q_1; 4Q_2−8Q_3]                    two blocks × forces
     double* from_late = nullptr;   // 4Q_3−Q_2                             one block × forces
-    double* middle = nullptr;      // [(h/2)(2φ_2 − 2φ_3) S̃, (h/2)(φ_3 − φ_2/2) S̃], φ_k(hL/2)   one block × 2 forces
+    double* middle =
+        nullptr;  // [(h/2)(2φ_2 − 2φ_3) S̃, (h/2)(φ_3 − φ_2/2) S̃], φ_k(hL/2)   one block × 2 forces
 };
 
 struct Mode;
@@ -71,35 +72,37 @@ struct Mode;
 struct ScratchData {
     explicit ScratchData(const ModelData& model);
     AlignedDoubles buffer;
-    Sample begin, end;           // live with the operators
+    Sample begin, end;  // live with the operators
     Sample half, late, middle;
     std::vector<PairLoad> loads;
-    std::vector<double> held;        // per pair: its load where that does not change within the step [Nm]
+    std::vector<double> held;          // per pair: its load where that does not change within the step [Nm]
     std::vector<unsigned char> moves;  // per pair: its load does, `loads` is its course
-    std::vector<int> moving;         // the pairs whose load does
-    std::vector<int> busy;           // the pairs whose valve or piston does not rest with the command
+    std::vector<int> moving;           // the pairs whose load does
+    std::vector<int> busy;             // the pairs whose valve or piston does not rest with the command
     int moving_count = 0;
-    std::vector<int> sliding, dragging;  // pairs that pass a torque while a part is under way: pressed, by their oil
+    std::vector<int> sliding,
+        dragging;  // pairs that pass a torque while a part is under way: pressed, by their oil
     int sliding_count = 0, dragging_count = 0;
-    std::vector<EngineMode> engine_modes;  // at the beginning of the step
+    std::vector<EngineMode> engine_modes;                                    // at the beginning of the step
     std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
     std::vector<signed char> family;
     AlignedDoubles vectors;
-    double *vector_a = nullptr, *vector_b = nullptr, *vector_c = nullptr;  // padded masses, torques, forces, or three blocks
+    double *vector_a = nullptr, *vector_b = nullptr,
+           *vector_c = nullptr;  // padded masses, torques, forces, or three blocks
     std::vector<double> torque_copy;
-    std::vector<double> heat;        // per pair in this step [J]
+    std::vector<double> heat;               // per pair in this step [J]
     double dissipated = 0, input_work = 0;  // in this step [J]
     double stored_before = 0, stored = 0;   // at its beginning, at its end [J]
     double viscosity = 0, oil_temperature = 0;
-    std::vector<double> workspace;   // of the mode builder
+    std::vector<double> workspace;  // of the mode builder
     std::vector<int> workspace_index;
     AlignedDoubles operator_memory, ledger_memory;  // operators of a partial step, of a part of one
-    const Mode* begin_groups = nullptr;  // mode in which the tree's begin.groups hold for `begin`
-    int told_events = 0;                 // so many of this step's events are told in full
-    bool turned = false;                 // power turned round in some mesh within the last part
-    double torque_residual = 0;          // of the tree's internal torques at `end`
-    StepOperators used;              // by the last advance
-    bool carries = false;            // `begin` is as the last advance left it, untouched by a change of state
+    const Mode* begin_groups = nullptr;             // mode in which the tree's begin.groups hold for `begin`
+    int told_events = 0;                            // so many of this step's events are told in full
+    bool turned = false;                            // power turned round in some mesh within the last part
+    double torque_residual = 0;                     // of the tree's internal torques at `end`
+    StepOperators used;                             // by the last advance
+    bool carries = false;  // `begin` is as the last advance left it, untouched by a change of state
 };
 
 }  // namespace shiftrig::plant::detail

@@ -120,7 +120,7 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
         const EngineInput in{input(m.throttle), input(law.speed_request_enable) > 0.5, input(law.speed_request),
                              input(law.torque_limit), input(law.fuel_cut) > 0.5};
         const double full = full_load(engine, speed);
-        auxiliary[0] = torque_demand(engine, law.peak, in, speed, full, 1);
+        auxiliary[0] = torque_demand(engine, engine_setting(engine, law.peak, in), speed, full, 1);
         auxiliary[1] = full > 0 ? std::clamp(auxiliary[0] / full, 0., 1.) : 0;
     }
     for (std::size_t i = 0; i < m.sensors.size(); ++i) {

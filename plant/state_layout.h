@@ -37,7 +37,7 @@ inline std::int64_t read_integer(const double* slot) noexcept {
 inline void write_integer(double* slot, std::int64_t value) noexcept { std::memcpy(slot, &value, sizeof value); }
 
 // A hydraulic actuator: its state, then the delay line.
-constexpr int hydraulic_slots = 8;
+constexpr int hydraulic_slots = 8, chamber_slot = 6;
 inline HydraulicState read_hydraulic(const double* at) noexcept {
     return {at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7]};
 }

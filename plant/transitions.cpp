@@ -646,14 +646,16 @@ bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
         forward = std::min(forward, slip_sign(w.contact[k]) * end.slip[k]);
     }
     if (reserve < 0 || forward < 0) return false;
-    for (int k = 0; k < m.meshes; ++k) {
+    if (mode.rests) return false;
+    double moving = 0, driving = 0;
+    for (const int k : m.lossy_meshes) {
         const unsigned char state = w.contact[m.pairs + k];
-        if (!m.lossy[static_cast<std::size_t>(k)]) continue;
-        if (state == stuck || mode.bound[m.pairs + k]) return false;
-        if (motion_sign(state) * slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z) < 0) return false;
-        if (turning_margin(w, m.pairs + k, end) < 0) return false;
+        const double sign = motion_sign(state), x = loss_exponent(state);
+        const double slip = slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z);
+        moving = std::min(moving, sign * slip);
+        driving = std::min(driving, (end.torque[m.pairs + k] - loss_kink(w, k, sign)) * (sign * x));
     }
-    return true;
+    return !(moving < 0 || driving < 0);
 }
 
 // What a locked freewheel would have to pass on against its sense, all_hold() does not see.

@@ -71,26 +71,34 @@ inline double no_load_speed(const Engine& p, const EngineInput& input) noexcept 
     return p.low_idle + input.throttle * (p.high_idle - p.low_idle);
 }
 
-// `peak` = largest_value(p.full_load), kept by the caller.
-inline double torque_demand(const Engine& p, double peak, const EngineInput& input, double speed, double full,
-                            double boost) noexcept {
+// What an input sets, as long as it stays the same. `peak` = largest_value(p.full_load), kept by the caller.
+struct EngineSetting {
+    double no_load_speed = 0;  // [rad/s]
+    double most = 0;           // torque limit [Nm]
+    bool fuel_cut = false;
+};
+inline EngineSetting engine_setting(const Engine& p, double peak, const EngineInput& input) noexcept {
+    return {no_load_speed(p, input), input.torque_limit * peak, input.fuel_cut};
+}
+
+inline double torque_demand(const Engine& p, const EngineSetting& set, double speed, double full, double boost) noexcept {
     const double friction = engine_friction(p, speed);
-    if (input.fuel_cut) return -friction;
+    if (set.fuel_cut) return -friction;
     const double share =
         p.turbo_lag > 0 ? p.turbo_instant_fraction + (1 - p.turbo_instant_fraction) * boost : 1;
-    const double upper = std::min(full * share, input.torque_limit * peak);
-    const double wanted = p.governor_slope * (no_load_speed(p, input) - speed);
-    return wanted < -friction ? -friction : wanted > upper ? upper : wanted;
+    const double upper = std::min(full * share, set.most);
+    const double wanted = p.governor_slope * (set.no_load_speed - speed);
+    return std::max(-friction, std::min(wanted, upper));
 }
 
 // Derivatives while running; a lag of 0 gives 0 (engine_torque then takes the demand itself). `full` is the full load
 // at this speed.
-inline EngineState engine_rate(const Engine& p, double peak, const EngineInput& input,
-                               const EngineState& state, double speed, double full) noexcept {
+inline EngineState engine_rate(const Engine& p, const EngineSetting& set, const EngineState& state, double speed,
+                               double full) noexcept {
     EngineState rate;
     if (p.actuator_lag > 0)
         rate.torque =
-            (torque_demand(p, peak, input, speed, full, state.boost) - state.torque) / p.actuator_lag;
+            (torque_demand(p, set, speed, full, state.boost) - state.torque) / p.actuator_lag;
     if (p.turbo_lag > 0) {
         const double load = full > 0 && state.torque > 0 ? std::min(state.torque / full, 1.) : 0;
         rate.boost = (load - state.boost) / p.turbo_lag;
@@ -103,12 +111,12 @@ inline double starter_torque(const Engine& p) noexcept {
 }
 
 // Torque of the engine on its mass, without the friction device of the stalled one.
-inline double engine_torque(const Engine& p, double peak, const EngineInput& input, const EngineState& state,
-                            EngineMode mode, double speed, double full) noexcept {
+inline double engine_torque(const Engine& p, const EngineSetting& set, const EngineState& state, EngineMode mode,
+                            double speed, double full) noexcept {
     if (mode == EngineMode::stalled) return 0;
     if (mode == EngineMode::cranking) return starter_torque(p);
     if (p.actuator_lag > 0) return state.torque;
-    return torque_demand(p, peak, input, speed, full, state.boost);
+    return torque_demand(p, set, speed, full, state.boost);
 }
 
 inline double stalled_friction_capacity(const Engine& p, EngineMode mode, double speed) noexcept {

@@ -40,7 +40,8 @@ class Curve {
             const bool last = i + 1 == table.size();
             x_.push_back(table[i].first);
             y_.push_back(table[i].second);
-            slope_.push_back(last ? 0 : (table[i + 1].second - table[i].second) / (table[i + 1].first - table[i].first));
+            slope_.push_back(
+                last ? 0 : (table[i + 1].second - table[i].second) / (table[i + 1].first - table[i].first));
         }
     }
     double at(double x) const noexcept {
