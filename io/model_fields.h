@@ -76,7 +76,8 @@ void fields(Fields& f, plant::Backlash& b) {
     f.number("stiffness_nm_per_rad", b.stiffness, positive, "of the closed flanks");
     f.number("damping_nm_s_per_rad", b.damping, not_negative, "damper parallel to it while they are closed");
     f.number("gap_rad", b.gap, positive, "the whole play, from flank to flank");
-    f.optional_number("initial_twist_rad", b.initial_twist, any, "at the start, a ahead of b [0: in the middle]");
+    f.optional_number("initial_twist_rad", b.initial_twist, any,
+                      "at the start, a ahead of b [0: in the middle]");
 }
 
 template <class Fields>
@@ -231,7 +232,8 @@ void fields(Fields& w, plant::Freewheel& f) {
              Choices<plant::Sense>{{"forward", plant::Sense::forward}, {"backward", plant::Sense::backward}},
              "sense of ω_a − ω_b that it does not let go: a cannot run ahead of b [forward], or fall behind");
     w.number("rated_torque_nm", f.rated_torque, positive, "that it holds in that sense");
-    w.number("sliding_share", f.sliding_share, share, "of the rated torque that is left while it slips overloaded");
+    w.number("sliding_share", f.sliding_share, share,
+             "of the rated torque that is left while it slips overloaded");
     w.optional_number("drag_torque_nm", f.drag_torque, not_negative, "while overrunning [0]");
 }
 

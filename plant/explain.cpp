@@ -16,12 +16,14 @@ std::string explain_freewheel(const FreewheelLaw& law, const Event& event) {
         return std::string(text);
     };
     if (event.kind == EventKind::break_away && is_next_to_overrun(law, event.torque))
-        return say("overruns: torque fell to %.1f Nm, it passes on none beyond a drag of %.1f", event.torque, law.drag);
+        return say("overruns: torque fell to %.1f Nm, it passes on none beyond a drag of %.1f", event.torque,
+                   law.drag);
     if (event.kind == EventKind::break_away)
         return say("slips overloaded: torque %.1f beyond the rated %.1f Nm", event.torque, law.rated);
     if (event.kind == EventKind::lock)
         return say("locks: slip %.3g, torque %.1f of %.1f Nm rated", event.slip, event.torque, law.rated);
-    return say(law.sense * event.slip < 0 ? "begins overrunning: slip %.3f rad/s" : "begins slipping: slip %.3f rad/s",
+    return say(law.sense * event.slip < 0 ? "begins overrunning: slip %.3f rad/s"
+                                          : "begins slipping: slip %.3f rad/s",
                event.slip);
 }
 
@@ -71,9 +73,11 @@ std::string explain(const Model& model, const Event& event) {
         case EventKind::facing_warning: return line + say("facing passes its warning temperature: %.0f degC", event.slip);
         case EventKind::facing_failure: return line + say("facing passes its failure temperature: %.0f degC", event.slip);
         case EventKind::flank_closes:
-            return line + say("closes its %s flank at %.3f rad/s", event.capacity > 0 ? "forward" : "backward", event.slip);
+            return line + say("closes its %s flank at %.3f rad/s",
+                              event.capacity > 0 ? "forward" : "backward", event.slip);
         case EventKind::flank_opens:
-            return line + say("opens its %s flank at %.3f rad/s", event.capacity > 0 ? "forward" : "backward", event.slip);
+            return line + say("opens its %s flank at %.3f rad/s", event.capacity > 0 ? "forward" : "backward",
+                              event.slip);
     }
     return line;
 }

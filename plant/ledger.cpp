@@ -142,7 +142,8 @@ void book_finely(Work& w, const Mode& mode) {
             loss += power;
         }
         s.dissipated += weight * loss;
-        for (int k = m.first_external; k < m.first_flank_force; ++k) external_work -= weight * at.f[k] * at.slip[k];
+        for (int k = m.first_external; k < m.first_flank_force; ++k)
+            external_work -= weight * at.f[k] * at.slip[k];
         for (std::size_t i = 0; i < m.translating.size(); ++i) {
             w.next[m.layout.distances + static_cast<int>(i)] -= weight * at.slip[m.translating_force[i]];
         }

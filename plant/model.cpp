@@ -130,7 +130,8 @@ void build_laws(ModelData& m) {
             case PairKind::engine_friction: law.source = LoadSource::engine; break;
         }
         if (pair.kind != PairKind::clutch) law.friction.base = law.friction.static_factor = 1;
-        if (law.freewheel >= 0) law.friction.base = d.freewheels[static_cast<std::size_t>(pair.source)].sliding_share;
+        if (law.freewheel >= 0)
+            law.friction.base = d.freewheels[static_cast<std::size_t>(pair.source)].sliding_share;
         if (law.heat) law.temperature = 2 * heated++;
         law.sliding_at_rest = sliding_factor(law.friction, 0);
         if (law.source == LoadSource::waveform) m.depends_on_time = true;
@@ -222,7 +223,8 @@ void build_sizes(ModelData& m) {
         m.noteworthy_torque = noteworthy;
     }
     for (double inertia : s.inertia) m.energy_factor.push_back(0.5 * inertia);
-    for (const Elastic& shaft : s.shafts) m.energy_factor.push_back(shaft.gap > 0 ? 0 : 0.5 * shaft.stiffness);
+    for (const Elastic& shaft : s.shafts)
+        m.energy_factor.push_back(shaft.gap > 0 ? 0 : 0.5 * shaft.stiffness);
     for (int j = 0; j < m.masses; ++j) {
         if (m.description.masses[static_cast<std::size_t>(j)].motion == Motion::translating) m.translating.push_back(j);
     }
@@ -292,8 +294,9 @@ void build_sizes(ModelData& m) {
     m.first_flank_force = static_cast<int>(m.force_columns.size());
     for (int e = m.plain_shafts; e < m.twists; ++e) {
         const Elastic& shaft = s.shafts[static_cast<std::size_t>(e)];
-        m.backlashes.push_back({e, m.first_flank + e - m.plain_shafts, static_cast<int>(m.force_columns.size()),
-                                shaft.stiffness, shaft.damping, 0.5 * shaft.gap});
+        m.backlashes.push_back({e, m.first_flank + e - m.plain_shafts,
+                                static_cast<int>(m.force_columns.size()), shaft.stiffness, shaft.damping,
+                                0.5 * shaft.gap});
         m.force_columns.push_back(shaft.links);
     }
     m.forces = static_cast<int>(m.force_columns.size());
@@ -303,7 +306,8 @@ void build_sizes(ModelData& m) {
     m.power_rows = m.law_rows + whole_panels(m.meshes + m.twists + static_cast<int>(s.dampers.size()));
     m.seen = m.power_rows + m.states;
     for (const auto* elastics : {&s.shafts, &s.dampers}) {
-        for (const Elastic& elastic : *elastics) m.swing_damping.push_back(elastic.gap > 0 ? 0 : elastic.damping);
+        for (const Elastic& elastic : *elastics)
+            m.swing_damping.push_back(elastic.gap > 0 ? 0 : elastic.damping);
     }
     for (const PairLaw& law : m.pair_laws) {
         m.static_factor.push_back(law.friction.static_factor);
@@ -322,7 +326,8 @@ void bound_step(ModelData& m) {
             mobility += link.factor * link.factor / m.structure.inertia[static_cast<std::size_t>(link.mass)];
         const double turn = std::sqrt(law.stiffness * mobility) * m.options.step_size;  // ωh
         m.maximum_events += 2 * static_cast<int>(std::ceil(std::min(turn, 1e4) / 3)) + 2;
-        while (m.maximum_parts > 1 && m.maximum_parts < turn && m.maximum_parts < 1 << 14) m.maximum_parts *= 2;
+        while (m.maximum_parts > 1 && m.maximum_parts < turn && m.maximum_parts < 1 << 14)
+            m.maximum_parts *= 2;
     }
 }
 

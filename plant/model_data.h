@@ -70,7 +70,8 @@ struct SensorLaw {
 
 // Outputs in groups: index of the first signal of each device.
 struct OutputLayout {
-    std::vector<int> mass, shaft, pair, freewheel, backlash, mesh, tyre, converter, engine, body, plough, sensor;
+    std::vector<int> mass, shaft, pair, freewheel, backlash, mesh, tyre, converter, engine, body, plough,
+        sensor;
     std::vector<int> pressure, temperature;  // per pair, −1 if it has none
     int oil = -1, energy = -1, certificate = -1;
 };
@@ -96,7 +97,7 @@ struct ModelData {
     int auxiliary = 0;                    // tyre slips, engine torque and boost
     int contact_bytes = 0;                // pairs, meshes, flanks
     int first_flank = 0;                  // contact byte: pairs + meshes
-    int maximum_events = 0, maximum_parts = 0;  // of a step, as described or as flanks need
+    int maximum_events = 0, maximum_parts = 0;       // of a step, as described or as flanks need
     std::vector<std::array<Link, 2>> force_columns;  // how f_k acts *out of* the masses (SDM sign)
     // Slips and twist rates for the step: the housing is there mass 0 with factor 0, which needs no branch.
     std::vector<std::array<Link, 2>> pair_slip, mesh_motion, mesh_loss, shaft_rate, damper_rate, force_on;

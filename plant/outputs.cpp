@@ -50,7 +50,10 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
         const unsigned char state = w.contact[k];
         const double slip = slip_fast(m.pair_slip[static_cast<std::size_t>(k)], speeds);
         const double torque = state == locked ? s.torque[k] : s.f[k];
-        put(torque, slip, state == locked ? 0. : slip_sign(state) * law.sense > 0 ? 1. : 2.,
+        put(torque, slip,
+            state == locked                    ? 0.
+            : slip_sign(state) * law.sense > 0 ? 1.
+                                               : 2.,
             state == locked ? 0. : torque * slip, block[m.layout.heat + k]);
     }
     for (const BacklashLaw& law : m.backlashes) {

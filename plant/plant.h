@@ -53,7 +53,8 @@ struct Event {
     EventKind kind{};
     std::int16_t device = -1;  // index into model.device_names(), −1: none
     double torque = 0;         // [Nm] on the first link
-    double capacity = 0;       // [Nm] static capacity for lock/break_away; what the loss allows for a stuck mesh; of a flank ±1, which
+    // [Nm] static capacity for lock/break_away; what the loss allows for a stuck mesh; +1 or −1, which flank it is
+    double capacity = 0;
     double slip = 0;           // [rad/s]
 };
 

@@ -37,7 +37,8 @@ RigidSet rigid_set(const Description& d, const Structure& s, const std::vector<s
     for (const std::string& name : closed) {
         const int index = s.pair(name);
         if (index < 0 || !can_be_closed(s.pairs[static_cast<std::size_t>(index)])) {
-            throw ModelError("model", d.name, "closed", "= \"" + name + "\" is no clutch, brake or freewheel");
+            throw ModelError("model", d.name, "closed",
+                             "= \"" + name + "\" is no clutch, brake or freewheel");
         }
     }
     RigidSet set;

@@ -185,7 +185,8 @@ void start(const Model& model, State& state, const Start& start, const Inputs& i
     std::vector<int> locked;
     for (const std::string& name : start.locked) {
         const int pair = m.structure.pair(name);
-        if (pair < 0) throw ModelError("start", name, "locked", "is no clutch, brake or freewheel of the model");
+        if (pair < 0)
+            throw ModelError("start", name, "locked", "is no clutch, brake or freewheel of the model");
         locked.push_back(pair);
     }
     std::vector<std::pair<int, double>> pinned;

@@ -223,12 +223,15 @@ class Solver {
             if (pair.kind != PairKind::freewheel) continue;
             const Freewheel& f = description_.freewheels[static_cast<std::size_t>(pair.source)];
             const double torque = torque_[static_cast<Eigen::Index>(k)];
-            if (freewheel_margin(freewheel_law(f, member.index), torque) > -1e-9 * torque_.cwiseAbs().maxCoeff()) continue;
+            if (freewheel_margin(freewheel_law(f, member.index), torque) >
+                -1e-9 * torque_.cwiseAbs().maxCoeff())
+                continue;
             char text[80];
             std::snprintf(text, sizeof text, "\" would have to pass on %.6g Nm: it ", torque);
-            fail("closed", "= " + list(problem_.closed) + ": freewheel \"" + f.name + text +
-                               (is_next_to_overrun(freewheel_law(f, member.index), torque) ? "overruns"
-                                                                                            : "slips overloaded"));
+            fail("closed",
+                 "= " + list(problem_.closed) + ": freewheel \"" + f.name + text +
+                     (is_next_to_overrun(freewheel_law(f, member.index), torque) ? "overruns"
+                                                                                 : "slips overloaded"));
         }
     }
 

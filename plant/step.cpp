@@ -124,8 +124,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
         Crossing first = first_crossing(w, *mode, s.begin, s.end);
-        const bool inside =
-            first.device >= 0 && localise && outputs.certificate.events < m.maximum_events;
+        const bool inside = first.device >= 0 && localise && outputs.certificate.events < m.maximum_events;
         double reached = until;
         if (inside && first.theta * (until - done) < instant) {
             reached = done;

@@ -113,7 +113,10 @@ Structure build_structure(const Description& d) {
     }
     for (std::size_t i = 0; i < d.freewheels.size(); ++i) {
         const Freewheel& f = d.freewheels[i];
-        s.pairs.push_back({f.name, PairKind::freewheel, static_cast<int>(i), {link(f.a, 1), link(f.b, -1)},
+        s.pairs.push_back({f.name,
+                           PairKind::freewheel,
+                           static_cast<int>(i),
+                           {link(f.a, 1), link(f.b, -1)},
                            f.rated_torque});
     }
     for (std::size_t i = 0; i < d.tyres.size(); ++i) {
@@ -151,7 +154,8 @@ Structure build_structure(const Description& d) {
 
     for (std::size_t i = 0; i < d.shafts.size(); ++i) {
         const Shaft& e = d.shafts[i];
-        s.shafts.push_back({e.name, {link(e.a, 1), link(e.b, -1)}, e.stiffness, e.damping, static_cast<int>(i), 0});
+        s.shafts.push_back(
+            {e.name, {link(e.a, 1), link(e.b, -1)}, e.stiffness, e.damping, static_cast<int>(i), 0});
     }
     for (std::size_t i = 0; i < d.backlashes.size(); ++i) {
         const Backlash& e = d.backlashes[i];

@@ -488,7 +488,9 @@ void change_flank(Work& w, const BacklashLaw& law, Sample& s) {
     const auto [twist, rate] = twist_of(w.model, law, s);
     unsigned char& state = w.contact[law.device];
     const double side = flank_side(state);
-    const double next = side != 0 ? 0 : open_margin(law, 1, twist, rate) < open_margin(law, -1, twist, rate) ? 1 : -1;
+    const double next = side != 0                                                              ? 0
+                        : open_margin(law, 1, twist, rate) < open_margin(law, -1, twist, rate) ? 1
+                                                                                               : -1;
     state = closed_flank(next);
     w.scratch.dissipated += flank_energy(law, side, twist) - flank_energy(law, next, twist);
     log_event(w, side == 0 ? EventKind::flank_closes : EventKind::flank_opens, law.device, s.at.time,
@@ -611,7 +613,8 @@ double margin(const Work& w, int device, const Sample& s) {
     if (device >= w.model.pairs) return motion_sign(state) * device_slip(w, device, s.z);
     if (state == locked) {
         const FreewheelLaw* law = freewheel_of(w, device);
-        return law ? freewheel_margin(*law, s.torque[device]) : s.holding[device] - std::fabs(s.torque[device]);
+        return law ? freewheel_margin(*law, s.torque[device])
+                   : s.holding[device] - std::fabs(s.torque[device]);
     }
     return slip_sign(state) * device_slip(w, device, s.z);
 }
@@ -627,7 +630,8 @@ double turning_margin(const Work& w, int device, const Sample& s) {
 double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Sample& s) SHIFTRIG_REALTIME {
     switch (crossing.change) {
         case Change::state:
-        case Change::overrun: return margin(w, crossing.device, s);
+        case Change::overrun:
+            return margin(w, crossing.device, s);
         case Change::turn: return turning_margin(w, crossing.device, s);
         case Change::release: return -release_drive(w, mode, crossing.device - w.model.pairs, s);
     }
@@ -741,7 +745,9 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
 
 bool hides_contact(const Work& w) SHIFTRIG_REALTIME {
     for (const BacklashLaw& law : w.model.backlashes) {
-        if (is_flank_violated(law, flank_margin_half_way(w, law)) && !is_flank_violated(w, law, w.scratch.end)) return true;
+        if (is_flank_violated(law, flank_margin_half_way(w, law)) &&
+            !is_flank_violated(w, law, w.scratch.end))
+            return true;
     }
     return false;
 }

@@ -27,9 +27,9 @@
 namespace shiftrig::plant {
 
 struct BacklashLaw {
-    int shaft = -1;   // among Structure::shafts, and so its twist
-    int device = -1;  // contact byte
-    int force = -1;   // in f: ∓kδ
+    int shaft = -1;                                   // among Structure::shafts, and so its twist
+    int device = -1;                                  // contact byte
+    int force = -1;                                   // in f: ∓kδ
     double stiffness = 0, damping = 0, half_gap = 0;  // k [Nm/rad], d [Nm s/rad], δ [rad]
 };
 

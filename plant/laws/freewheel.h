@@ -26,10 +26,10 @@
 namespace shiftrig::plant {
 
 struct FreewheelLaw {
-    int pair = -1;         // its friction pair
-    double sense = 1;      // s
-    double rated = 0;      // M_R [Nm]
-    double drag = 0;       // M_D [Nm]
+    int pair = -1;     // its friction pair
+    double sense = 1;  // s
+    double rated = 0;  // M_R [Nm]
+    double drag = 0;   // M_D [Nm]
 };
 
 inline FreewheelLaw freewheel_law(const Freewheel& f, int pair) noexcept {

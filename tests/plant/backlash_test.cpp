@@ -36,7 +36,8 @@ INSTANTIATE_TEST_SUITE_P(Steps, EachStep, ::testing::Values(1e-3, 1e-4),
 void expect_bounces(const Pair& pair, double h, double seconds, double time_tolerance) {
     Rig rig(pair.description(), {h, KernelKind::automatic});
     rig.run(seconds);
-    const auto closes = rig.times(EventKind::flank_closes, "B"), opens = rig.times(EventKind::flank_opens, "B");
+    const auto closes = rig.times(EventKind::flank_closes, "B"),
+               opens = rig.times(EventKind::flank_opens, "B");
     const double flight = 2 * pair.half_gap / pair.speed, contact = pi / pair.omega();
     const double first = pair.half_gap / pair.speed;
     const auto expected = static_cast<std::size_t>(std::floor((seconds - first) / (flight + contact))) + 1;
@@ -49,10 +50,13 @@ void expect_bounces(const Pair& pair, double h, double seconds, double time_tole
     }
     EXPECT_EQ(rig.fall_backs, 0);
     // A step is exact to 2e-14 of what it moves, whose kinetic energy is a thousand times that of the bouncing.
-    const double rounding = 2e-14 * static_cast<double>(rig.state.steps()), momentum = 50 * (pair.j1 + pair.j2);
-    EXPECT_NEAR(pair.j1 * rig.out("mass.1.speed") + pair.j2 * rig.out("mass.2.speed"), momentum, rounding * momentum);
+    const double rounding = 2e-14 * static_cast<double>(rig.state.steps()),
+                 momentum = 50 * (pair.j1 + pair.j2);
+    EXPECT_NEAR(pair.j1 * rig.out("mass.1.speed") + pair.j2 * rig.out("mass.2.speed"), momentum,
+                rounding * momentum);
     // Whatever instants are missed by is strain that changes hands: 1e-5 of a step's way, squared.
-    EXPECT_NEAR(rig.out("energy.dissipated"), 0, 1e-8 * pair.relative_energy() * static_cast<double>(closes.size()));
+    EXPECT_NEAR(rig.out("energy.dissipated"), 0,
+                1e-8 * pair.relative_energy() * static_cast<double>(closes.size()));
     EXPECT_NEAR(rig.out("energy.defect"), 0, rounding * 0.5 * 50 * momentum);
 }
 
@@ -76,20 +80,23 @@ TEST_P(EachStep, ADampedImpactLastsAndRestoresWhatTheClosedFormSays) {
     const double touch = pair.half_gap / pair.speed, damped = pair.omega() * std::sqrt(1 - zeta * zeta);
     const double contact = (pi - 2 * std::asin(zeta)) / damped;
     rig.run(touch + contact + 3e-3);
-    const auto closes = rig.times(EventKind::flank_closes, "B"), opens = rig.times(EventKind::flank_opens, "B");
+    const auto closes = rig.times(EventKind::flank_closes, "B"),
+               opens = rig.times(EventKind::flank_opens, "B");
     ASSERT_EQ(closes.size(), 1u);
     ASSERT_EQ(opens.size(), 1u);
     EXPECT_NEAR(closes[0], touch, 1e-5 * GetParam());
     EXPECT_NEAR(opens[0], touch + contact, 2e-5 * GetParam());
     // ψ̇ at M = 0, with ψ = v/ω_d e^(−ζωt) sin ω_d t.
     const double decay = std::exp(-zeta * pair.omega() * contact);
-    const double left = pair.speed * decay *
-                        (std::cos(damped * contact) - zeta * pair.omega() / damped * std::sin(damped * contact));
+    const double left =
+        pair.speed * decay *
+        (std::cos(damped * contact) - zeta * pair.omega() / damped * std::sin(damped * contact));
     EXPECT_NEAR(rig.out("mass.1.speed") - rig.out("mass.2.speed"), left, 1e-6);
     // All that is gone was lost in the flank: while it was closed, and with the strain it still had when it opened.
     EXPECT_NEAR(rig.out("energy.dissipated"), pair.relative_energy() - 0.5 * pair.reduced() * left * left,
                 1e-5 * pair.relative_energy());
-    EXPECT_NEAR(rig.out("energy.defect"), 0, 3e4 * std::pow(GetParam(), 4) + 1e-8);  // Simpson, and rounding of 2 kJ
+    EXPECT_NEAR(rig.out("energy.defect"), 0,
+                3e4 * std::pow(GetParam(), 4) + 1e-8);  // Simpson, and rounding of 2 kJ
 }
 
 // At rest under T, which turns to −T at 0.1 s: cos ωt = 1/2 when the flank opens, then free flight under −T, then contact.
@@ -112,9 +119,11 @@ TEST_P(EachStep, AReversalOfTorqueCrossesThePlayInTheTimeOfFreeFlight) {
     EXPECT_EQ(rig.out("backlash.B.state"), 1);
     rig.run(0.3);
     const double opening = 0.1 + pi / 3 / pair.omega();
-    const double speed = 2 * torque / pair.stiffness * pair.omega() * std::sin(pi / 3), a = torque / pair.reduced();
+    const double speed = 2 * torque / pair.stiffness * pair.omega() * std::sin(pi / 3),
+                 a = torque / pair.reduced();
     const double flight = (-speed + std::sqrt(speed * speed + 4 * a * pair.half_gap)) / a;
-    const auto closes = rig.times(EventKind::flank_closes, "B"), opens = rig.times(EventKind::flank_opens, "B");
+    const auto closes = rig.times(EventKind::flank_closes, "B"),
+               opens = rig.times(EventKind::flank_opens, "B");
     ASSERT_GE(opens.size(), 1u);
     ASSERT_GE(closes.size(), 1u);
     EXPECT_NEAR(opens[0], opening, 2e-5 * GetParam());
@@ -161,7 +170,8 @@ TEST(Backlash, TheOrderAcrossItsEventsIsThatOfTheMethod) {
         Rig rig(d, {h, KernelKind::automatic});
         rig.run(0.4 * (1 + 1e-12));
         EXPECT_GE(rig.times(EventKind::flank_opens, "B").size(), 3u);
-        return std::vector<double>{rig.out("mass.1.speed"), rig.out("mass.2.speed"), 30 * rig.out("backlash.B.twist")};
+        return std::vector<double>{rig.out("mass.1.speed"), rig.out("mass.2.speed"),
+                                   30 * rig.out("backlash.B.twist")};
     };
     const auto truth = final_state(0.4 / 65536);
     std::vector<double> errors;
@@ -179,8 +189,8 @@ TEST(Backlash, TheOrderAcrossItsEventsIsThatOfTheMethod) {
 TEST(Backlash, MeetsClutchesGearsAndOtherGapsInOneMachine) {
     Description d;
     d.name = "rattling box";
-    d.masses = {mass("engine", 1, 100), mass("input", 0.1, 80), mass("pinion", 0.02, 80), mass("wheel", 0.5, 40),
-                mass("axle", 3, 40)};
+    d.masses = {mass("engine", 1, 100), mass("input", 0.1, 80), mass("pinion", 0.02, 80),
+                mass("wheel", 0.5, 40), mass("axle", 3, 40)};
     d.clutches = {clutch("C", "engine", "input", 80, 1.1)};
     d.backlashes = {{"B1", "input", "pinion", 2e5, 5, 2e-3, 0}, {"B2", "wheel", "axle", 5e4, 20, 1e-2, 0}};
     Gear gear;
@@ -241,7 +251,9 @@ TEST(Backlash, ALongChainFallsBackToTheDenseEngineOrSaysWhy) {
         Model::build(d);
         FAIL();
     } catch (const ModelError& error) {
-        EXPECT_STREQ(error.what(), "model \"gap\": method = ark3 needs a machine without loops: backlash \"B\" changes its stiffness");
+        EXPECT_STREQ(error.what(),
+                     "model \"gap\": method = ark3 needs a machine without loops: backlash \"B\" changes its "
+                     "stiffness");
     }
     d.method = Method::automatic;
     for (int i = 3; i < 30; ++i) {
@@ -280,8 +292,10 @@ TEST(Backlash, StaticsGoesThroughTheClosedFlank) {
 
 std::string refusal(const std::string& line) {
     try {
-        io::parse_model("name: m\nmasses:\n  a: {inertia_kg_m2: 1}\n  b: {inertia_kg_m2: 1}\nbacklashes:\n  B: " + line + "\n",
-                        "m.yaml");
+        io::parse_model(
+            "name: m\nmasses:\n  a: {inertia_kg_m2: 1}\n  b: {inertia_kg_m2: 1}\nbacklashes:\n  B: " + line +
+                "\n",
+            "m.yaml");
     } catch (const std::exception& error) {
         return error.what();
     }
@@ -291,7 +305,8 @@ std::string refusal(const std::string& line) {
 TEST(Backlash, IsReadFromItsStanzaOrRefusedInOneLine) {
     const auto file = io::parse_model(
         "name: m\nmasses:\n  a: {inertia_kg_m2: 1}\n  b: {inertia_kg_m2: 1}\nbacklashes:\n"
-        "  B: {a: a, b: b, stiffness_nm_per_rad: 9000, damping_nm_s_per_rad: 3, gap_rad: 0.02, initial_twist_rad: -0.01}\n",
+        "  B: {a: a, b: b, stiffness_nm_per_rad: 9000, damping_nm_s_per_rad: 3, gap_rad: 0.02, "
+        "initial_twist_rad: -0.01}\n",
         "m.yaml");
     const Backlash& b = file.description.backlashes.at(0);
     EXPECT_EQ(b.stiffness, 9000);

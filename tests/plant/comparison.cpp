@@ -321,8 +321,8 @@ std::string describe(const Description& d) {
         s += text("  shaft %s %s-%s k=%.6g d=%.6g twist0=%.6g\n", e.name.c_str(), e.a.c_str(), e.b.c_str(),
                   e.stiffness, e.damping, e.initial_twist);
     for (const auto& b : d.backlashes)
-        s += text("  backlash %s %s-%s k=%.6g d=%.6g gap=%.6g twist0=%.6g\n", b.name.c_str(), b.a.c_str(), b.b.c_str(),
-                  b.stiffness, b.damping, b.gap, b.initial_twist);
+        s += text("  backlash %s %s-%s k=%.6g d=%.6g gap=%.6g twist0=%.6g\n", b.name.c_str(), b.a.c_str(),
+                  b.b.c_str(), b.stiffness, b.damping, b.gap, b.initial_twist);
     for (const auto& k : d.dampers)
         s += text("  damper %s %s-%s d=%.6g\n", k.name.c_str(), k.a.c_str(), k.b.c_str(), k.damping);
     for (const auto& c : d.clutches) {
@@ -334,8 +334,9 @@ std::string describe(const Description& d) {
         s += "\n";
     }
     for (const auto& f : d.freewheels)
-        s += text("  freewheel %s %s-%s blocks %s %.6g Nm share %.4g drag %.4g\n", f.name.c_str(), f.a.c_str(), f.b.c_str(),
-                  f.blocks == Sense::forward ? "forward" : "backward", f.rated_torque, f.sliding_share, f.drag_torque);
+        s += text("  freewheel %s %s-%s blocks %s %.6g Nm share %.4g drag %.4g\n", f.name.c_str(),
+                  f.a.c_str(), f.b.c_str(), f.blocks == Sense::forward ? "forward" : "backward",
+                  f.rated_torque, f.sliding_share, f.drag_torque);
     for (const auto& g : d.gears)
         s += text("  gear %s %s-%s u=%.6g eta=%.6g bearing=%.4g\n", g.name.c_str(), g.a.c_str(), g.b.c_str(),
                   g.ratio, g.efficiency, g.bearing_torque);

@@ -44,7 +44,8 @@ INSTANTIATE_TEST_SUITE_P(Steps, EachEngineAndStep,
 // M = (J2 T sin Ωt + J1 c)/(J1 + J2) (eq. (10) of [Algin] with M2 = −c) reaches 0 at t1; from then on both go alone,
 // until 1 has caught up with 2 at t2.
 struct Alternating {
-    static constexpr double j1 = 0.5, j2 = 2, torque = 40, resistance = 6, frequency = 5, omega = 2 * pi * frequency;
+    static constexpr double j1 = 0.5, j2 = 2, torque = 40, resistance = 6, frequency = 5,
+                            omega = 2 * pi * frequency;
     double t1, t2, joint1, joint2;
 
     static double impulse(double from, double to) {  // of the torque on 1
@@ -85,8 +86,9 @@ TEST_P(EachEngineAndStep, AlternatingTorqueSwitchesWhenTheClosedFormSays) {
     Rig again(Alternating::description(GetParam().method), {h, KernelKind::automatic});
     again.run(0.3);
     ASSERT_LT(exact.t2, 0.3);
-    const double joint = exact.joint2 + (Alternating::impulse(exact.t2, 0.3) - Alternating::resistance * (0.3 - exact.t2)) /
-                                            (Alternating::j1 + Alternating::j2);
+    const double joint =
+        exact.joint2 + (Alternating::impulse(exact.t2, 0.3) - Alternating::resistance * (0.3 - exact.t2)) /
+                           (Alternating::j1 + Alternating::j2);
     // Quadrature of the sine by Simpson is of order 4 with constant 1/2880 a step.
     EXPECT_NEAR(again.out("mass.1.speed"), joint, 2e-11 + 3e3 * std::pow(h, 4));
     EXPECT_EQ(again.out("freewheel.F.state"), 0);
@@ -99,7 +101,8 @@ TEST_P(EachEngineAndStep, MomentumIsConservedByEveryLockingAndLettingGo) {
     for (int period = 1; period <= 5; ++period) {
         const double t = period / Alternating::frequency;
         rig.run(t);
-        const double momentum = Alternating::j1 * rig.out("mass.1.speed") + Alternating::j2 * rig.out("mass.2.speed");
+        const double momentum =
+            Alternating::j1 * rig.out("mass.1.speed") + Alternating::j2 * rig.out("mass.2.speed");
         const double exact = 20 * (Alternating::j1 + Alternating::j2) - Alternating::resistance * t;
         // Whole periods of the sine add nothing, and Simpson's error over them neither but where events cut a step.
         EXPECT_NEAR(momentum, exact, 1e-10 + 3e3 * std::pow(h, 4)) << period;
@@ -128,7 +131,8 @@ TEST_P(EachEngineAndStep, ItNeverPullsAndNeverRunsAheadAndItsAccountCloses) {
     }
     EXPECT_GT(rig.out("freewheel.F.heat"), 1);
     EXPECT_NEAR(rig.out("energy.dissipated"), rig.out("freewheel.F.heat"), 1e-9);
-    EXPECT_NEAR(rig.out("energy.defect"), 0, 1e-9 + 6e4 * std::pow(h, 3));  // Simpson of drag and torque, cut by events
+    EXPECT_NEAR(rig.out("energy.defect"), 0,
+                1e-9 + 6e4 * std::pow(h, 3));  // Simpson of drag and torque, cut by events
     EXPECT_EQ(rig.fall_backs, 0);
 }
 
@@ -221,7 +225,8 @@ TEST_P(EachEngineAndStep, APairOfThemRectifiesASwing) {
     Description d;
     d.name = "ratchet drive";
     d.masses = {mass("rocker", 0.2), mass("wheel", 1)};
-    d.freewheels = {freewheel("drive", "rocker", "wheel", 200), freewheel("hold", "wheel", "", 200, 0, Sense::backward)};
+    d.freewheels = {freewheel("drive", "rocker", "wheel", 200),
+                    freewheel("hold", "wheel", "", 200, 0, Sense::backward)};
     d.sources = {source("rocker", sine(30, 4)), source("wheel", constant(-3))};
     d.method = GetParam().method;
     Rig rig(d, {GetParam().h, KernelKind::automatic});
@@ -298,9 +303,12 @@ TEST(Freewheel, StaticsKnowsWhichWayItPasses) {
         }
         return "";
     };
-    EXPECT_EQ(refusal(-40), "statics \"alternating\": closed = F: freewheel \"F\" would have to pass on -40 Nm: it overruns");
+    EXPECT_EQ(
+        refusal(-40),
+        "statics \"alternating\": closed = F: freewheel \"F\" would have to pass on -40 Nm: it overruns");
     EXPECT_EQ(refusal(501),
-              "statics \"alternating\": closed = F: freewheel \"F\" would have to pass on 501 Nm: it slips overloaded");
+              "statics \"alternating\": closed = F: freewheel \"F\" would have to pass on 501 Nm: it slips "
+              "overloaded");
 }
 
 TEST(Freewheel, IsRigidInTheModalViewWhereItIsLocked) {
@@ -315,8 +323,10 @@ TEST(Freewheel, IsRigidInTheModalViewWhereItIsLocked) {
 
 std::string refusal(const std::string& line) {
     try {
-        io::parse_model("name: m\nmasses:\n  a: {inertia_kg_m2: 1}\n  b: {inertia_kg_m2: 1}\nfreewheels:\n  F: " + line + "\n",
-                        "m.yaml");
+        io::parse_model(
+            "name: m\nmasses:\n  a: {inertia_kg_m2: 1}\n  b: {inertia_kg_m2: 1}\nfreewheels:\n  F: " + line +
+                "\n",
+            "m.yaml");
     } catch (const std::exception& error) {
         return error.what();
     }
@@ -326,7 +336,8 @@ std::string refusal(const std::string& line) {
 TEST(Freewheel, IsReadFromItsStanzaOrRefusedInOneLine) {
     const auto file = io::parse_model(
         "name: m\nmasses:\n  a: {inertia_kg_m2: 1}\nfreewheels:\n"
-        "  F: {a: a, b: housing, blocks: backward, rated_torque_nm: 90, sliding_share: 0.6, drag_torque_nm: 2}\n",
+        "  F: {a: a, b: housing, blocks: backward, rated_torque_nm: 90, sliding_share: 0.6, drag_torque_nm: "
+        "2}\n",
         "m.yaml");
     const Freewheel& f = file.description.freewheels.at(0);
     EXPECT_EQ(f.b, "");

@@ -386,7 +386,8 @@ RandomSystem random_system_with_backlashes(std::uint64_t seed, double seconds) {
     Dice dice(seed + 0x9a9);
     std::vector<Shaft> kept;
     double torque = 0;
-    for (const TorqueSource& source : system.description.sources) torque = std::max(torque, std::abs(source.waveform.pieces[0].offset));
+    for (const TorqueSource& source : system.description.sources)
+        torque = std::max(torque, std::abs(source.waveform.pieces[0].offset));
     for (const Shaft& shaft : system.description.shafts) {
         if (!dice.chance(0.7)) {
             kept.push_back(shaft);

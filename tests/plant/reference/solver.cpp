@@ -451,8 +451,8 @@ double Solver::fastest_rate() {
         damping[play.shaft] = play.damping;
     }
     const Matrix k = a * stiffness.asDiagonal() * a.transpose();
-    const Matrix d = a * damping.asDiagonal() * a.transpose() +
-                     root.asDiagonal() * system_.damper * root.asDiagonal();
+    const Matrix d =
+        a * damping.asDiagonal() * a.transpose() + root.asDiagonal() * system_.damper * root.asDiagonal();
     return std::max(std::sqrt(k.operatorNorm()), d.operatorNorm());
 }
 

@@ -50,10 +50,13 @@ struct Friction {
     // What a held device has left of its limit, and the sense in which it begins to slip at this torque.
     double reserve(When when, const Vector& z, double torque, double tolerance) const {
         const double limit = holding(when, z) * (1 + tolerance);
-        return sense == 0 ? limit - std::abs(torque) : std::min(limit - sense * torque, drag + sense * torque);
+        return sense == 0 ? limit - std::abs(torque)
+                          : std::min(limit - sense * torque, drag + sense * torque);
     }
     double opens_towards(When when, const Vector& z, double torque) const {
-        return sense == 0 ? torque : drag + sense * torque < holding(when, z) - sense * torque ? -sense : sense;
+        return sense == 0                                                  ? torque
+               : drag + sense * torque < holding(when, z) - sense * torque ? -sense
+                                                                           : sense;
     }
 };
 
