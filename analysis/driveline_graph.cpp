@@ -31,6 +31,9 @@ class Builder {
         for (const auto& shaft : machine_.shafts)
             device(Kind::shaft, shaft.name, digits(shaft.stiffness) + " Nm/rad",
                    {{shaft.a, ""}, {shaft.b, ""}});
+        for (const auto& backlash : machine_.backlashes)
+            device(Kind::backlash, backlash.name, digits(1e3 * backlash.gap) + " mrad",
+                   {{backlash.a, ""}, {backlash.b, ""}});
         for (const auto& damper : machine_.dampers)
             device(Kind::damper, damper.name, digits(damper.damping) + " Nm s/rad",
                    {{damper.a, ""}, {damper.b, ""}});
@@ -39,6 +42,9 @@ class Builder {
                    : clutch.radius > 0 ? Kind::tyre
                                        : Kind::clutch,
                    clutch.name, "", {{clutch.a, ""}, {clutch.b, ""}});
+        for (const auto& freewheel : machine_.freewheels)
+            device(freewheel.b.empty() ? Kind::sprag : Kind::freewheel, freewheel.name,
+                   digits(freewheel.rated_torque) + " Nm", {{freewheel.a, ""}, {freewheel.b, ""}});
         for (const auto& gear : machine_.gears)
             device(Kind::gear, gear.name, "u " + digits(gear.ratio), {{gear.a, ""}, {gear.b, ""}});
         for (const auto& row : machine_.planetaries)

@@ -158,6 +158,7 @@ void build_balance(const ModelData& m, Mode& mode, const double* expansion, doub
         }
     };
     for (int e = 0; e < m.twists; ++e) {
+        if (!is_shaft_closed(m, mode, e)) continue;
         const Elastic& shaft = s.shafts[static_cast<std::size_t>(e)];
         add(m.masses + e, shaft.stiffness, shaft.links);
         damped(shaft.damping, shaft.links);

@@ -42,6 +42,19 @@ void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcep
     }
 }
 
+// Overrunning freewheels pass on their drag only; in the other sense they are pairs like any other.
+void freewheel_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
+    for (const FreewheelLaw& law : w.model.freewheels) {
+        if (slip_sign(contact[law.pair]) * law.sense < 0) s.f[law.pair] = -law.sense * law.drag;
+    }
+}
+
+// ∓kδ of closed flanks: their torque is k φ of the mode and this.
+void flank_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
+    for (const BacklashLaw& law : w.model.backlashes)
+        s.f[law.force] = -flank_side(contact[law.device]) * law.stiffness * law.half_gap;
+}
+
 void bearing_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
     const ModelData& m = w.model;
     if (m.first_external == m.pairs) return;
@@ -170,6 +183,8 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHI
     }
     law_forces(w, s);
     pair_forces(w, contact, s);
+    freewheel_forces(w, contact, s);
+    flank_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }
 
@@ -209,6 +224,8 @@ void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
         const int k = scratch.dragging[static_cast<std::size_t>(i)];
         s.f[k] = open_drag(w, k, s);
     }
+    freewheel_forces(w, w.contact, s);
+    flank_forces(w, w.contact, s);
     bearing_forces(w, w.contact, s);
 }
 
@@ -219,6 +236,8 @@ void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIF
         if (contact[k] == free_running && m.pair_laws[static_cast<std::size_t>(k)].drag > 0)
             s.f[k] = open_drag(w, k, s);
     }
+    freewheel_forces(w, contact, s);
+    flank_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }
 

@@ -12,7 +12,7 @@ constexpr double swing_tolerance = 2e-5;
 double largest_torque(const ModelData& m, const Sample& s) {
     double largest = 0;
     for (int k = 0; k < m.torques; ++k) largest = std::max(largest, std::fabs(s.torque[k]));
-    for (int k = 0; k < m.forces; ++k) largest = std::max(largest, std::fabs(s.f[k]));
+    for (int k = 0; k < m.first_flank_force; ++k) largest = std::max(largest, std::fabs(s.f[k]));
     return largest;
 }
 

@@ -71,9 +71,10 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
                 double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 4;
     // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
-    // beyond.
-    const bool by_itself = crossing.change != Change::state;
-    const double close_enough = by_itself ? 1e-2 : 1e-5, beyond = by_itself ? 3e-3 : 0;
+    // beyond. So too with a freewheel that lets go at no torque: this side of it, it would only lock again.
+    const bool by_itself = acts_by_itself(crossing.change), overrun = crossing.change == Change::overrun;
+    const double close_enough = by_itself ? 1e-2 : overrun ? 1e-3 : 1e-5;
+    const double beyond = by_itself ? 3e-3 : overrun ? 3e-4 : 0;
     double low = done, high = until;
     const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
     double at_low = left(w.scratch.begin), at_high = left(w.scratch.end);
@@ -109,14 +110,14 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     Mode* mode = &begin_mode(w);
 
     double length = 1;  // of a part, at most
-    int leans = m.description.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
-    const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.description.maximum_parts : 1);
+    int leans = m.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
+    const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.maximum_parts : 1);
     for (double done = 0; done < 1;) {
         // Advance over what is left, up to the next jump of a law; in halves where that is too much at once.
         const double split = next_split(w, done);
         double until = part_end(done, split, length);
         integrate(w, *mode, until);
-        while (length > longest_whole && is_coarse(w)) {
+        while (length > longest_whole && (is_coarse(w) || hides_contact(w))) {
             length *= 0.5;
             until = part_end(done, split, length);
             integrate(w, *mode, until);
@@ -124,11 +125,10 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
         Crossing first = first_crossing(w, *mode, s.begin, s.end);
-        const bool inside =
-            first.device >= 0 && localise && outputs.certificate.events < m.description.maximum_events;
+        const bool inside = first.device >= 0 && localise && outputs.certificate.events < m.maximum_events;
         double reached = until;
         // What a mesh does by itself it does only beyond its limit: there is always a little way to go.
-        if (inside && first.change == Change::state && first.theta * (until - done) < instant) {
+        if (inside && !acts_by_itself(first.change) && first.theta * (until - done) < instant) {
             reached = done;
         } else if (inside && first.theta < 1 - instant) {
             reached = approach(w, *mode, first, done, until);
@@ -145,10 +145,10 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
         // The new state acts from here on; where events are used up, or by choice, from the next step on.
         if (inside) {
-            const bool moves = first.change != Change::state || change_state(w, first.device, s.begin);
+            const bool moves = acts_by_itself(first.change) || change_state(w, first.device, s.begin);
             if (moves || --leans < 0) ++outputs.certificate.events;
         } else if (first.device >= 0 && first.change != Change::turn) {
-            if (first.change == Change::state) change_all(w, *mode, s.begin);
+            if (!acts_by_itself(first.change)) change_all(w, *mode, s.begin);
             outputs.certificate.fall_backs += localise;
         }
         if (done < 1 || first.device >= 0) {

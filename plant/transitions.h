@@ -15,10 +15,16 @@ enum class Change {
     state,    // a pair opens or closes, a mesh comes to rest
     turn,     // the power through a mesh turns round
     release,  // a stuck mesh goes
+    overrun,  // a freewheel lets go
 };
 
+// Once the crossing lies behind, settle() does the rest.
+constexpr bool acts_by_itself(Change change) noexcept {
+    return change == Change::turn || change == Change::release;
+}
+
 struct Crossing {
-    int device = -1;   // contact byte: pair or pairs + mesh; −1: nobody changes
+    int device = -1;   // contact byte: pair, mesh or flank; −1: nobody changes
     double theta = 1;  // where between begin and end, 0…1
     Change change = Change::state;
 };
@@ -27,6 +33,9 @@ struct Crossing {
 // changes sign ([Algin] eq. (13)), a torque above the static capacity (eq. (12)). Where shafts are so stiff that
 // they swing within the step, reversals of power are looked for as well; elsewhere correct_directions() does.
 Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME;
+
+// Has a flank closed or opened half way that at the end is as it was? The part is too long for it.
+bool hides_contact(const Work& work) SHIFTRIG_REALTIME;
 
 // How far from its change the device is at the sample: slip in the direction of its motion, capacity left, torque
 // beyond the point where both losses of a mesh agree, what a stuck mesh lacks to go. Negative: behind it.

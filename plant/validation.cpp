@@ -29,7 +29,7 @@ class Check {
     void positive(const char* field, double value) const { rule(field, value, value > 0, "> 0"); }
     void not_negative(const char* field, double value) const { rule(field, value, value >= 0, ">= 0"); }
     void not_zero(const char* field, double value) const { rule(field, value, value != 0, "different from 0"); }
-    void efficiency(const char* field, double value) const {
+    void share(const char* field, double value) const {
         rule(field, value, value > 0 && value <= 1, "in (0, 1]");
     }
     void any(const char* field, double value) const { rule(field, value, true, "finite"); }
@@ -218,8 +218,10 @@ void check_unique_names(const Description& d) {
     // A mass may lend its name to a device (the engine on the mass "engine"); two devices may not share one.
     seen.clear();
     add("shaft", d.shafts);
+    add("backlash", d.backlashes);
     add("damper", d.dampers);
     add("clutch", d.clutches);
+    add("freewheel", d.freewheels);
     add("gear", d.gears);
     add("planetary row", d.planetaries);
     add("tyre", d.tyres);
@@ -253,6 +255,16 @@ void validate(const Description& d) {
         joints.link("shaft", e.name, "b", e.b);
         distinct("shaft", e.name, "b", e.a, e.b);
     }
+    for (const Backlash& b : d.backlashes) {
+        const Check check("backlash", b.name);
+        check.positive("stiffness", b.stiffness);
+        check.not_negative("damping", b.damping);
+        check.positive("gap", b.gap);
+        check.any("initial_twist", b.initial_twist);
+        joints.link("backlash", b.name, "a", b.a);
+        joints.link("backlash", b.name, "b", b.b);
+        distinct("backlash", b.name, "b", b.a, b.b);
+    }
     for (const Damper& k : d.dampers) {
         Check("damper", k.name).positive("damping", k.damping);
         joints.link("damper", k.name, "a", k.a);
@@ -266,11 +278,20 @@ void validate(const Description& d) {
         if (!c.b.empty()) joints.link(kind, c.name, "b", c.b);
         distinct(kind, c.name, "b", c.a, c.b);
     }
+    for (const Freewheel& f : d.freewheels) {
+        const Check check("freewheel", f.name);
+        check.positive("rated_torque", f.rated_torque);
+        check.share("sliding_share", f.sliding_share);
+        check.not_negative("drag_torque", f.drag_torque);
+        joints.link("freewheel", f.name, "a", f.a);
+        if (!f.b.empty()) joints.link("freewheel", f.name, "b", f.b);
+        distinct("freewheel", f.name, "b", f.a, f.b);
+    }
     for (const Gear& g : d.gears) {
         const Check check("gear", g.name);
         check.not_zero("ratio", g.ratio);
-        check.efficiency("efficiency", g.efficiency);
-        if (g.backward_efficiency != 0) check.efficiency("backward_efficiency", g.backward_efficiency);
+        check.share("efficiency", g.efficiency);
+        if (g.backward_efficiency != 0) check.share("backward_efficiency", g.backward_efficiency);
         check.not_negative("bearing_torque", g.bearing_torque);
         check.any("backward_bearing_torque", g.backward_bearing_torque);
         for (const auto& option : g.options) check.not_zero("options", option.second);
@@ -282,7 +303,7 @@ void validate(const Description& d) {
         const Check check("planetary row", p.name);
         check.not_zero("ratio", p.ratio);
         if (p.ratio == 1) check.fail("ratio", "= 1; sun and ring would turn as one whatever the carrier does");
-        check.efficiency("efficiency", p.efficiency);
+        check.share("efficiency", p.efficiency);
         joints.link("planetary row", p.name, "sun", p.sun);
         joints.link("planetary row", p.name, "ring", p.ring);
         joints.link("planetary row", p.name, "carrier", p.carrier);

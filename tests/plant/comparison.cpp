@@ -31,10 +31,12 @@ Table table_of(const Description& d, const Result& result) {
     Table t;
     for (const auto& m : d.masses) t.names.push_back("mass." + m.name + ".speed");
     for (const auto& s : d.shafts) t.names.push_back("shaft." + s.name + ".twist");
+    for (const auto& b : d.backlashes) t.names.push_back("backlash." + b.name + ".twist");
     t.unit.assign(d.masses.size(), 0);
     t.unit.resize(t.names.size(), 1);
     t.smooth = static_cast<int>(t.names.size());
     for (const auto& c : d.clutches) t.names.push_back("clutch." + c.name + ".torque");
+    for (const auto& f : d.freewheels) t.names.push_back("freewheel." + f.name + ".torque");
     for (const auto& g : d.gears) t.names.push_back("gear." + g.name + ".torque");
     for (const auto& r : d.planetaries) t.names.push_back("row." + r.name + ".sun");
     t.unit.resize(t.names.size(), 2);
@@ -114,6 +116,11 @@ double violation_of(const Description& d, const Model& model, const Outputs& out
     for (const auto& c : d.clutches)
         if (outputs.value[static_cast<std::size_t>(model.output("clutch." + c.name + ".state"))] == 0)
             worst = std::max(worst, std::abs(speed(c.a) - (c.b.empty() ? 0.0 : speed(c.b))));
+    for (const auto& f : d.freewheels) {
+        const double slip = speed(f.a) - (f.b.empty() ? 0.0 : speed(f.b));
+        if (outputs.value[static_cast<std::size_t>(model.output("freewheel." + f.name + ".state"))] == 0)
+            worst = std::max(worst, std::abs(slip));
+    }
     return worst;
 }
 
@@ -220,6 +227,7 @@ Description perturbed(Description d, double relative, std::uint64_t seed) {
     const auto factor = [&] { return 1 + relative * (engine() % 2 == 0 ? 1 : -1); };
     for (auto& m : d.masses) m.initial_speed *= factor();
     for (auto& c : d.clutches) std::get<DryFriction>(c.friction).sliding_capacity *= factor();
+    for (auto& f : d.freewheels) f.rated_torque *= factor();
     for (auto& s : d.sources) {
         const double f = factor();
         for (auto& p : s.waveform.pieces) {
@@ -312,6 +320,9 @@ std::string describe(const Description& d) {
     for (const auto& e : d.shafts)
         s += text("  shaft %s %s-%s k=%.6g d=%.6g twist0=%.6g\n", e.name.c_str(), e.a.c_str(), e.b.c_str(),
                   e.stiffness, e.damping, e.initial_twist);
+    for (const auto& b : d.backlashes)
+        s += text("  backlash %s %s-%s k=%.6g d=%.6g gap=%.6g twist0=%.6g\n", b.name.c_str(), b.a.c_str(),
+                  b.b.c_str(), b.stiffness, b.damping, b.gap, b.initial_twist);
     for (const auto& k : d.dampers)
         s += text("  damper %s %s-%s d=%.6g\n", k.name.c_str(), k.a.c_str(), k.b.c_str(), k.damping);
     for (const auto& c : d.clutches) {
@@ -322,6 +333,10 @@ std::string describe(const Description& d) {
         if (const auto* direct = std::get_if<ActuationDirect>(&c.actuation)) s += text_of(direct->profile);
         s += "\n";
     }
+    for (const auto& f : d.freewheels)
+        s += text("  freewheel %s %s-%s blocks %s %.6g Nm share %.4g drag %.4g\n", f.name.c_str(),
+                  f.a.c_str(), f.b.c_str(), f.blocks == Sense::forward ? "forward" : "backward",
+                  f.rated_torque, f.sliding_share, f.drag_torque);
     for (const auto& g : d.gears)
         s += text("  gear %s %s-%s u=%.6g eta=%.6g bearing=%.4g\n", g.name.c_str(), g.a.c_str(), g.b.c_str(),
                   g.ratio, g.efficiency, g.bearing_torque);

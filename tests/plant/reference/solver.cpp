@@ -51,7 +51,7 @@ void Solver::free_torque(When when, const Vector& state, const Mode& trial, Vect
         if (s == 0) continue;
         const auto& friction = system_.frictions[f];
         const double slip = friction.column.dot(state.head(system_.masses));
-        out -= friction.column * (s * friction.sliding(when, state, slip));
+        out -= friction.column * (s * friction.slides(when, state, slip, s));
     }
     for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
         const auto& mesh = system_.meshes[m];
@@ -173,8 +173,13 @@ double Solver::worst_overload(When when, const Torques& torques, const Mode& tri
     double worst = 0;
     for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
         if (trial.friction[f] != Hold::held) continue;
-        const double ratio = std::abs(torques.friction[static_cast<Eigen::Index>(f)]) /
-                             std::max(system_.frictions[f].holding(when, z), 1e-300);
+        const double torque = torques.friction[static_cast<Eigen::Index>(f)];
+        // A freewheel without drag lets go at any torque of the wrong sign, but not at rounding.
+        const double least = 1e-9 * (torques.free.lpNorm<Eigen::Infinity>() + 1e-6);
+        const auto& friction = system_.frictions[f];
+        const double limit =
+            friction.is_free_side(torque) ? std::max(friction.drag, least) : friction.holding(when, z);
+        const double ratio = std::abs(torque) / std::max(limit, 1e-300);
         if (ratio <= worst) continue;
         worst = ratio;
         if (which) *which = static_cast<int>(f);
@@ -291,7 +296,7 @@ void Solver::settle(When when) {
         int worst = -1;
         if (worst_overload(when, work_, mode, &worst) > 1 + overload_tolerance) {
             const auto f = static_cast<std::size_t>(worst);
-            mode.friction[f] = toward(work_.friction[worst]);
+            mode.friction[f] = toward(system_.frictions[f].opens_towards(when, z, work_.friction[worst]));
             note(when.t, system_.frictions[f].name, "slips");
             continue;
         }
@@ -341,8 +346,9 @@ void Solver::margins(When when, const Vector& state, Vector& g) {
         if (mode.friction[f] == Hold::free)
             second = threshold - holding;
         else if (mode.friction[f] == Hold::held)
-            first = holding * (1 + 2 * overload_tolerance) -
-                    std::abs(work_.friction[static_cast<Eigen::Index>(f)]);
+            first = friction.reserve(when, state, work_.friction[static_cast<Eigen::Index>(f)],
+                                     2 * overload_tolerance) +
+                    (friction.sense != 0 ? torque_tolerance : 0);
         else
             first =
                 sign_of(mode.friction[f]) * friction.column.dot(state.head(system_.masses)) + speed_tolerance;
@@ -412,7 +418,7 @@ Sample Solver::sample(When when) {
         if (sign != 0) {
             const double slip = system_.frictions[f].column.dot(z.head(system_.masses));
             s.friction_torque[static_cast<Eigen::Index>(f)] =
-                sign * system_.frictions[f].sliding(when, z, slip);
+                sign * system_.frictions[f].slides(when, z, slip, sign);
             // Pushes against devices that hold: they share the load as their history has it.
             if (std::abs(slip) < 1e-9) resting = true;
         }
@@ -456,7 +462,7 @@ Solver::Energy Solver::power(When when, const Vector& state, const Vector& force
         const double s = sign_of(mode.friction[f]);
         if (s == 0) continue;
         const double slip = system_.frictions[f].column.dot(omega);
-        p.dissipated += s * slip * system_.frictions[f].sliding(when, state, slip);
+        p.dissipated += s * slip * system_.frictions[f].slides(when, state, slip, s);
     }
     const Response* response = nullptr;
     for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
@@ -500,9 +506,14 @@ void Solver::rk4(double t, double inside, double h, Vector& out, Energy& energy)
 double Solver::fastest_rate() {
     const Vector root = system_.inertia.cwiseSqrt().cwiseInverse();
     const Matrix a = root.asDiagonal() * system_.shaft_columns;
-    const Matrix k = a * system_.stiffness.asDiagonal() * a.transpose();
-    const Matrix d = a * system_.damping.asDiagonal() * a.transpose() +
-                     root.asDiagonal() * system_.damper * root.asDiagonal();
+    Vector stiffness = system_.stiffness, damping = system_.damping;
+    for (const auto& play : system_.plays) {
+        stiffness[play.shaft] = play.stiffness;
+        damping[play.shaft] = play.damping;
+    }
+    const Matrix k = a * stiffness.asDiagonal() * a.transpose();
+    const Matrix d =
+        a * damping.asDiagonal() * a.transpose() + root.asDiagonal() * system_.damper * root.asDiagonal();
     return std::max(std::sqrt(k.operatorNorm()), d.operatorNorm());
 }
 

@@ -11,6 +11,8 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -38,6 +40,24 @@ struct Friction {
     // Capacities [Nm] ≥ 0; sliding depends on |slip|.
     std::function<double(When, const Vector& z, double slip)> sliding;
     std::function<double(When, const Vector& z)> holding;
+    // A freewheel has these capacities in one sense, ±1, and in the other its drag in place of both.
+    double sense = 0, drag = 0;
+
+    bool is_free_side(double sign) const { return sense * sign < 0; }
+    double slides(When when, const Vector& z, double slip, double sign) const {
+        return is_free_side(sign) ? drag : sliding(when, z, slip);
+    }
+    // What a held device has left of its limit, and the sense in which it begins to slip at this torque.
+    double reserve(When when, const Vector& z, double torque, double tolerance) const {
+        const double limit = holding(when, z) * (1 + tolerance);
+        return sense == 0 ? limit - std::abs(torque)
+                          : std::min(limit - sense * torque, drag + sense * torque);
+    }
+    double opens_towards(When when, const Vector& z, double torque) const {
+        return sense == 0                                                  ? torque
+               : drag + sense * torque < holding(when, z) - sense * torque ? -sense
+                                                                           : sense;
+    }
 };
 
 struct Mesh {
@@ -75,6 +95,17 @@ struct System {
     Vector inertia;
     Matrix shaft_columns;  // masses × shafts
     Vector stiffness, damping;
+    // A shaft with play has its twist among the shafts, at their end, and its torque from here: no states, no events.
+    struct Play {
+        int shaft;
+        double stiffness, damping, half_gap;
+        double torque(double twist, double rate) const {
+            if (twist > half_gap) return std::max(0.0, stiffness * (twist - half_gap) + damping * rate);
+            if (twist < -half_gap) return std::min(0.0, stiffness * (twist + half_gap) + damping * rate);
+            return 0;
+        }
+    };
+    std::vector<Play> plays;
     Matrix damper;  // M̃ −= damper·ω
     std::vector<Friction> frictions;
     std::vector<Mesh> meshes;
