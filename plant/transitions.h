@@ -15,6 +15,7 @@ enum class Change {
     state,    // a pair opens or closes, a mesh comes to rest
     turn,     // the power through a mesh turns round
     release,  // a stuck mesh goes
+    limit,    // a stuck mesh stays, but has to leave to others what is too much for its loss
 };
 
 struct Crossing {
@@ -27,6 +28,10 @@ struct Crossing {
 // changes sign ([Algin] eq. (13)), a torque above the static capacity (eq. (12)). Where shafts are so stiff that
 // they swing within the step, reversals of power are looked for as well; elsewhere correct_directions() does.
 Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME;
+
+// Where between begin and end the margin of a device that holds at both is so small that it may have been negative:
+// a slip that comes to zero and goes back, a torque that is too much for an instant. 1: nowhere.
+double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME;
 
 // How far from its change the device is at the sample: slip in the direction of its motion, capacity left, torque
 // beyond the point where both losses of a mesh agree, what a stuck mesh lacks to go. Negative: behind it.
