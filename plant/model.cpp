@@ -302,7 +302,7 @@ void build_sizes(ModelData& m) {
     m.forces = static_cast<int>(m.force_columns.size());
     for (const auto& links : m.force_columns) m.force_on.push_back(branchless(links));
     m.columns = m.states + m.forces;
-    m.law_rows = whole_panels(m.forces);
+    m.law_rows = whole_panels(m.forces + m.meshes);
     m.power_rows = m.law_rows + whole_panels(m.meshes + m.twists + static_cast<int>(s.dampers.size()));
     m.seen = m.power_rows + m.states;
     for (const auto* elastics : {&s.shafts, &s.dampers}) {

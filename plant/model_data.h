@@ -90,7 +90,8 @@ struct ModelData {
     int first_flank_force = 0;            // where external torques end in f
     int plain_shafts = 0;                 // without play; those with it follow
     int columns = 0;                      // states + m, at most what an operator multiplies
-    // What a view shows: slips of forces; from `law_rows` on those of meshes, shafts and dampers; from `power_rows` on z.
+    // What a view shows: slips of forces, motions of meshes; from `law_rows` on what losses of meshes, shafts and dampers
+    // act on; from `power_rows` on z.
     // Both are whole panels, so that the first part alone (force laws), or the first two (powers), are products too.
     int law_rows = 0, power_rows = 0, seen = 0;
     int torques = 0;                      // unknowns: pairs, meshes, losses of stuck meshes

@@ -24,6 +24,7 @@ void place_sample(const ModelData& m, Sample& s, double* memory) {
     const auto pairs = static_cast<std::size_t>(m.pairs), auxiliary = static_cast<std::size_t>(m.auxiliary);
     s.slip =
         take(static_cast<std::size_t>(whole_panels(m.seen)));  // what products write begins on cache lines
+    s.motion = s.slip + m.forces;
     s.turning = s.slip + m.law_rows;
     s.swing = s.turning + m.meshes;
     s.z = s.slip + m.power_rows;

@@ -111,21 +111,31 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
     double length = 1;  // of a part, at most
     int leans = m.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
+    int dips = m.maximum_events;   // margins looked at where they are least
     const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.maximum_parts : 1);
     for (double done = 0; done < 1;) {
         // Advance over what is left, up to the next jump of a law; in halves where that is too much at once.
         const double split = next_split(w, done);
         double until = part_end(done, split, length);
         integrate(w, *mode, until);
-        while (length > longest_whole && (is_coarse(w) || hides_contact(w))) {
+        while (length > longest_whole && (is_coarse(w, *mode) || hides_contact(w))) {
             length *= 0.5;
             until = part_end(done, split, length);
             integrate(w, *mode, until);
         }
+        if (localise && dips > 0) {
+            const double theta = first_dip(w, *mode);
+            if (theta < 1) {
+                --dips;
+                until = done + theta * (until - done);
+                integrate(w, *mode, until);
+            }
+        }
 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
         Crossing first = first_crossing(w, *mode, s.begin, s.end);
-        const bool inside = first.device >= 0 && localise && outputs.certificate.events < m.maximum_events;
+        const bool inside =
+            first.device >= 0 && localise && outputs.certificate.events * length < m.maximum_events;
         double reached = until;
         // What a mesh does by itself it does only beyond its limit: there is always a little way to go.
         if (inside && !acts_by_itself(first.change) && first.theta * (until - done) < instant) {
@@ -145,9 +155,10 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
         // The new state acts from here on; where events are used up, or by choice, from the next step on.
         if (inside) {
-            const bool moves = acts_by_itself(first.change) || change_state(w, first.device, s.begin);
+            const bool moves = acts_by_itself(first.change) ? first.change != Change::limit
+                                                            : change_state(w, first.device, s.begin);
             if (moves || --leans < 0) ++outputs.certificate.events;
-        } else if (first.device >= 0 && first.change != Change::turn) {
+        } else if (first.device >= 0 && first.change != Change::turn && first.change != Change::limit) {
             if (!acts_by_itself(first.change)) change_all(w, *mode, s.begin);
             outputs.certificate.fall_backs += localise;
         }

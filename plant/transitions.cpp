@@ -143,10 +143,10 @@ struct Use {
     int pair = -1;
     double share = 0;  // torque over capacity
 };
-Use most_used(const Work& w, const Sample& s) {
+Use most_used(const Work& w, const unsigned char* contact, const Sample& s) {
     Use worst;
     for (int k = 0; k < w.model.pairs; ++k) {
-        if (w.contact[k] != locked) continue;
+        if (contact[k] != locked) continue;
         const double use = std::fabs(s.torque[k]) / static_limit(w, k, s);
         if (use > worst.share && (use <= overload || is_overloaded(w, k, s))) worst = {k, use};
     }
@@ -195,7 +195,7 @@ bool lean_on_losses(Work& w, const Mode& mode, double use, Sample& s) {
             trial[k] = moving(direction, w.scratch.torque_copy[static_cast<std::size_t>(k)] * direction < 0 ? -1 : 1);
             contact_forces(w, trial, s);
             const Mode& leaning = find_directions(w, trial, s);
-            const double relieved = most_used(w, s).share;
+            const double relieved = most_used(w, w.contact, s).share;
             if (!leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
             use = relieved;
             found = true;
@@ -347,6 +347,54 @@ LossAtRest loss_at_rest(const Work& w, int k, const Sample& s) {
     const double allowed = drives ? (1 - mesh.forward_efficiency) * torque + mesh.forward_bearing
                                   : (1 - 1 / mesh.backward_efficiency) * torque + mesh.backward_bearing;
     return {needed, allowed};
+}
+
+// What is left of the loss that a stuck mesh can take.
+double loss_left(const Work& w, int mesh, const Sample& s) {
+    const LossAtRest loss = loss_at_rest(w, mesh, s);
+    return loss.allowed - std::fabs(loss.needed);
+}
+
+// A stuck mesh that nothing sets in motion, but whose loss would have to be more than it can be, stays at its limit, and a
+// pair at rest that had been at its own takes the rest: it locks. The counterpart of lean_on_losses().
+bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) {
+    const ModelData& m = w.model;
+    if (mode.tree) return false;
+    unsigned char* trial = w.scratch.trial.data();
+    double size = 0;
+    for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
+        const int mesh = mode.rows[r] - m.pairs - m.meshes, device = m.pairs + mesh;
+        const double left = loss_left(w, mesh, s);
+        if (left >= 0) continue;
+        if (size == 0) size = torque_scale(w, s);
+        if (left >= -1e-9 * size) continue;
+        const double direction = s.torque[device + m.meshes] < 0 ? -1 : 1;
+        const int x = s.torque[device] * direction < 0 ? -1 : 1;
+        double least = overload;
+        int taker = -1;
+        for (int k = 0; k < m.pairs; ++k) {
+            if (!slips(w.contact[k]) || !mode.bound[k] || w.scratch.overcome[static_cast<std::size_t>(k)]) continue;
+            if (std::fabs(device_slip(w, k, s.z)) > at_rest) continue;
+            std::copy(w.contact, w.contact + m.contact_bytes, trial);
+            trial[device] = moving(direction, x);
+            trial[k] = locked;
+            contact_forces(w, trial, s);
+            const Mode& shared = find_directions(w, trial, s);
+            const double use = most_used(w, trial, s).share;
+            if (!shared.bound[device] || use >= least) continue;
+            least = use;
+            taker = k;
+            std::copy(trial, trial + m.contact_bytes, w.scratch.release.data());
+        }
+        if (taker >= 0) {
+            std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);
+            log_event(w, EventKind::lock, taker, s.at.time, 0, s.holding[taker], 0);
+        }
+        contact_forces(w, w.contact, s);
+        if (taker >= 0) return true;
+        internal_torques(w, mode, s);
+    }
+    return false;
 }
 
 // Closings are told with the torques that they lead to.
@@ -596,8 +644,8 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
     for (int passes = 0;; ++passes, complete = false) {
         Mode& mode = find_directions(w, w.contact, s, complete);
         if (passes <= most_passes) {
-            if (release_stuck_meshes(w, mode, s)) continue;
-            const Use worst = most_used(w, s);
+            if (release_stuck_meshes(w, mode, s) || leave_to_pairs(w, mode, s)) continue;
+            const Use worst = most_used(w, w.contact, s);
             if (is_overloaded(w, worst.pair, s)) {
                 if (!lean_on_losses(w, mode, worst.share, s)) open(w, mode, worst.pair, s);
                 continue;
@@ -638,6 +686,7 @@ double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Samp
             return margin(w, crossing.device, s);
         case Change::turn: return turning_margin(w, crossing.device, s);
         case Change::release: return -release_drive(w, mode, crossing.device - w.model.pairs, s);
+        case Change::limit: return loss_left(w, crossing.device - w.model.pairs, s);
     }
     return 0;
 }
@@ -659,7 +708,7 @@ bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
     for (const int k : m.lossy_meshes) {
         const unsigned char state = w.contact[m.pairs + k];
         const double sign = motion_sign(state), x = loss_exponent(state);
-        const double slip = slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z);
+        const double slip = mode.tree ? slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z) : end.motion[k];
         moving = std::min(moving, sign * slip);
         driving = std::min(driving, (end.torque[m.pairs + k] - loss_kink(w, k, sign)) * (sign * x));
     }
@@ -684,12 +733,47 @@ static void complete_half(Work& w, const Mode& mode) {
     active_torques(w.model, mode, w.scratch.half);
 }
 
+double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const Sample &begin = w.scratch.begin, &half = w.scratch.half, &end = w.scratch.end;
+    double first = 1;
+    if (mode.tree) return first;
+    // The least of the parabola through three margins; that they are about to vanish is enough to look closer.
+    const auto consider = [&](double g0, double gm, double g1) {
+        const double slope = 4 * gm - 3 * g0 - g1, bend = 2 * (g0 - 2 * gm + g1);
+        if (!(g0 >= 0 && g1 > 0 && slope < 0)) return;
+        const double theta = -0.5 * slope / bend;
+        if (theta > 0.02 && theta < 0.98 && g0 + 0.5 * slope * theta < 0.1 * std::min(g0, g1)) first = std::min(first, theta);
+    };
+    // What has just been let go begins at zero: it may be driven back at first.
+    const auto begun = [](double slip) { return std::fabs(slip) < at_rest ? 0 : slip; };
+    bool torques_known = false;
+    for (int k = 0; k < m.pairs; ++k) {
+        const unsigned char state = w.contact[k];
+        if (slips(state)) {
+            const double sign = slip_sign(state);
+            consider(begun(sign * begin.slip[k]), sign * half.slip[k], sign * end.slip[k]);
+        } else if (state == locked && std::fabs(end.torque[k]) > 0.8 * end.holding[k] && !freewheel_of(w, k)) {
+            if (!torques_known) complete_half(w, mode);
+            torques_known = true;
+            consider(margin(w, k, begin), margin(w, k, half), margin(w, k, end));
+        }
+    }
+    for (const int k : m.lossy_meshes) {
+        const unsigned char state = w.contact[m.pairs + k];
+        if (state == stuck || mode.bound[m.pairs + k]) continue;
+        const double sign = motion_sign(state);
+        consider(begun(sign * begin.motion[k]), sign * half.motion[k], sign * end.motion[k]);
+    }
+    return first;
+}
+
 Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     w.scratch.turned = false;
     Crossing first;
     if (all_hold(w, mode, end) && freewheels_hold(w, end) && flanks_hold(w, end)) return first;
-    bool rates_known = false, middle_known = false;
+    bool rates_known = false, middle_known = false, begin_known = false;
     for (int k = 0; k < m.first_flank; ++k) {
         if (!violated(w, mode, k, end)) continue;
         double theta;
@@ -721,7 +805,16 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
         const int leader = mode.rows[r] - m.pairs - m.meshes;
         const double drive = release_drive(w, mode, leader, end);
-        if (drive <= 0) continue;
+        if (drive <= 0) {
+            const double left = loss_left(w, leader, end);
+            if (left >= 0) continue;
+            if (!begin_known) internal_torques(w, mode, begin);
+            begin_known = true;
+            const double before = loss_left(w, leader, begin);
+            const double theta = before / (before - left);
+            if (before > 0 && (first.device < 0 || theta < first.theta)) first = {m.pairs + leader, theta, Change::limit};
+            continue;
+        }
         const double before = std::min(release_drive(w, mode, leader, begin), 0.);
         const double theta = before / (before - drive);
         if (first.device < 0 || theta < first.theta) first = {m.pairs + leader, theta, Change::release};
@@ -761,7 +854,7 @@ bool change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
         change_flank(w, backlash_of(w, device), s);
     } else if (device < w.model.pairs && w.contact[device] == locked) {
         const Mode& mode = find_mode(w.model, w.operators, w.contact, w.scratch);
-        if (lean_on_losses(w, mode, most_used(w, s).share, s)) return false;
+        if (lean_on_losses(w, mode, most_used(w, w.contact, s).share, s)) return false;
         open(w, mode, device, s);
     } else {
         close(w, device, s);

@@ -16,11 +16,12 @@ enum class Change {
     turn,     // the power through a mesh turns round
     release,  // a stuck mesh goes
     overrun,  // a freewheel lets go
+    limit,    // a stuck mesh stays, but has to leave to others what is too much for its loss
 };
 
 // Once the crossing lies behind, settle() does the rest.
 constexpr bool acts_by_itself(Change change) noexcept {
-    return change == Change::turn || change == Change::release;
+    return change == Change::turn || change == Change::release || change == Change::limit;
 }
 
 struct Crossing {
@@ -36,6 +37,9 @@ Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end
 
 // Has a flank closed or opened half way that at the end is as it was? The part is too long for it.
 bool hides_contact(const Work& work) SHIFTRIG_REALTIME;
+// Where between begin and end the margin of a device that holds at both is so small that it may have been negative:
+// a slip that comes to zero and goes back, a torque that is too much for an instant. 1: nowhere.
+double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME;
 
 // How far from its change the device is at the sample: slip in the direction of its motion, capacity left, torque
 // beyond the point where both losses of a mesh agree, what a stuck mesh lacks to go. Negative: behind it.

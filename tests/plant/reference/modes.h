@@ -40,14 +40,22 @@ struct Response {
     Matrix mesh_freedom, loss_freedom, friction_freedom;
 };
 
+// Where mechanics does not determine how devices at rest share a load, it is assumed to be shared in the way that
+// spares the fullest of them.
+enum class Sharing : std::int8_t {
+    free,     // by any split that no mass feels
+    by_loss,  // by the losses of meshes at rest alone; friction devices share in proportion to what they can carry
+};
+
 class Responses {
   public:
-    explicit Responses(const System& system) : system_(system) {}
+    Responses(const System& system, Sharing sharing) : system_(system), sharing_(sharing) {}
     const Response& of(const Mode& mode);
 
   private:
     Response build(const Mode& mode) const;
     const System& system_;
+    Sharing sharing_;
     std::map<std::vector<int>, Response> cache_;
     Mode last_mode_;
     const Response* last_ = nullptr;

@@ -20,7 +20,8 @@ Hold toward(double value) {
 
 }  // namespace
 
-Solver::Solver(const System& system) : z(system.start), system_(system), responses_(system) {
+Solver::Solver(const System& system, Sharing sharing)
+    : z(system.start), system_(system), responses_(system, sharing) {
     if (z.size() < system.size()) z.conservativeResizeLike(Vector::Zero(system.size()));
     for (const auto& friction : system.frictions)
         mode.friction.push_back(friction.initially_held ? Hold::held : Hold::free);

@@ -41,7 +41,7 @@ struct Result {
 
 class Solver {
   public:
-    explicit Solver(const System& system);
+    explicit Solver(const System& system, Sharing sharing = Sharing::free);
 
     // Continues where the last run ended; the first begins at time 0 and samples it too.
     Result run(double until, const Options& options);
