@@ -98,6 +98,7 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
     for (std::size_t i = 0; i < m.road_mass.size(); ++i) {
         known.grade_forces[i] = grade_force(m.description.roads[i], input(w, m.grade), m.description.gravity);
     }
+    for (std::size_t i = 0; i < m.sources.size(); ++i) known.source_inputs[i] = input(w, m.sources[i].input);
     for (std::size_t i = 0; i < m.sensors.size(); ++i) {
         const SensorLaw& law = m.sensors[i];
         known.sensor_faults[i] = {input(w, law.bias), input(w, law.noise), input(w, law.stuck) > 0.5,
@@ -159,7 +160,8 @@ void law_forces(const Work& w, Sample& s) noexcept {
     for (std::size_t i = 0; i < m.sources.size(); ++i) {
         const TorqueSource& source = d.sources[i];
         const int force = m.sources[i].force;
-        double torque = waveform(source.waveform, s.at.time, s.at.side) + input(w, m.sources[i].input);
+        double torque = known.source_inputs[i];
+        if (!source.waveform.pieces.empty()) torque += waveform(source.waveform, s.at.time, s.at.side);
         if (source.quadratic != 0) torque += source.quadratic * s.slip[force] * std::fabs(s.slip[force]);
         s.f[force] += torque;
     }

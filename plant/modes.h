@@ -130,6 +130,7 @@ struct OperatorsData {
     std::vector<PairCommand> commands;
     std::vector<double> rest_loads;    // per pair: its load where its actuator has arrived at the command [Nm]
     std::vector<SensorFaults> sensor_faults;
+    std::vector<double> source_inputs;  // [Nm]
     std::vector<TyreSoil> soils;
     std::vector<EngineSetting> engine_settings;
     std::vector<double> grade_forces;  // per road [N]

@@ -741,7 +741,7 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     // The least of the parabola through three margins; that they are about to vanish is enough to look closer.
     const auto consider = [&](double g0, double gm, double g1) {
         const double slope = 4 * gm - 3 * g0 - g1, bend = 2 * (g0 - 2 * gm + g1);
-        if (!(g0 >= 0 && g1 > 0 && slope < 0)) return;
+        if (!(slope < 0 && slope + 2 * bend > 0 && g0 >= 0 && g1 > 0)) return;  // falling at first, rising at last
         const double theta = -0.5 * slope / bend;
         if (theta > 0.02 && theta < 0.98 && g0 + 0.5 * slope * theta < 0.1 * std::min(g0, g1)) first = std::min(first, theta);
     };
