@@ -16,6 +16,7 @@ enum class Change {
     turn,     // the power through a mesh turns round
     release,  // a stuck mesh goes
     overrun,  // a freewheel lets go
+    flank,    // a flank closes or opens
 };
 
 // Once the crossing lies behind, settle() does the rest.
