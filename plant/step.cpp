@@ -92,6 +92,36 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
     }
 }
 
+// The same for a flank, whose new state only holds behind the crossing: as near behind it as rounding lets nobody mind.
+// Regula falsi towards a margin just below 0, an end that stays twice counted half (Illinois).
+double approach_flank(Work& w, const Mode& mode, const Crossing& crossing, double done,
+                      double until) SHIFTRIG_REALTIME {
+    constexpr int most_steps = 12;
+    constexpr double close_enough = 1e-5, beyond = 3e-6;  // of the margins at both ends
+    double low = done, high = until;
+    const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
+    double at_low = left(w.scratch.begin), at_high = left(w.scratch.end);
+    const double size = std::fabs(at_low) + std::fabs(at_high);
+    at_low += beyond * size;
+    at_high += beyond * size;
+    double reached = done + std::min(crossing.theta + beyond, 1.) * (until - done);
+    int side = 0;
+    for (int steps = 1; steps < most_steps; ++steps) {
+        integrate(w, mode, reached);
+        const double rest = left(w.scratch.end);
+        if (rest <= 0 && rest >= -close_enough * size) return reached;
+        const bool before = rest > 0;
+        (before ? low : high) = reached;
+        (before ? at_low : at_high) = rest + beyond * size;
+        if (side == (before ? 1 : -1)) (before ? at_high : at_low) *= 0.5;
+        side = before ? 1 : -1;
+        const double share = at_low > 0 && at_high < 0 ? at_low / (at_low - at_high) : 0.5;
+        reached = low + std::clamp(share, 1e-6, 1 - 1e-6) * (high - low);
+    }
+    integrate(w, mode, high);
+    return high;
+}
+
 }  // namespace
 
 void step(const Model& model, Operators& operators, State& state, const Inputs& inputs, Outputs& outputs,
@@ -141,7 +171,8 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         if (inside && !acts_by_itself(first.change) && first.theta * (until - done) < instant) {
             reached = done;
         } else if (inside && first.theta < 1 - instant) {
-            reached = approach(w, *mode, first, done, until);
+            reached = first.change == Change::flank ? approach_flank(w, *mode, first, done, until)
+                                                    : approach(w, *mode, first, done, until);
         }
 
         // Energy ledger of the accepted part.

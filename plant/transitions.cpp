@@ -683,6 +683,7 @@ double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Samp
     switch (crossing.change) {
         case Change::state:
         case Change::overrun:
+        case Change::flank:
             return margin(w, crossing.device, s);
         case Change::turn: return turning_margin(w, crossing.device, s);
         case Change::release: return -release_drive(w, mode, crossing.device - w.model.pairs, s);
@@ -800,7 +801,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         const double g0 = flank_margin(w, law, begin), g1 = flank_margin(w, law, end);
         const double gm = flank_margin_half_way(w, law);
         const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
-        if (first.device < 0 || theta < first.theta) first = {law.device, theta, Change::state};
+        if (first.device < 0 || theta < first.theta) first = {law.device, theta, Change::flank};
     }
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
         const int leader = mode.rows[r] - m.pairs - m.meshes;

@@ -17,6 +17,7 @@ enum class Change {
     release,  // a stuck mesh goes
     overrun,  // a freewheel lets go
     limit,    // a stuck mesh stays, but has to leave to others what is too much for its loss
+    flank,    // a flank closes or opens
 };
 
 // Once the crossing lies behind, settle() does the rest.

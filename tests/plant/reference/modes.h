@@ -23,6 +23,7 @@ struct Mode {
     std::vector<Hold> mesh;      // sign of the relative motion, or held (lossless meshes: always plus)
     std::vector<int> x;          // loss direction of each mesh
     std::vector<bool> at_rest;   // mesh whose relative speed is exactly 0, whatever its loss torque does
+    std::vector<int> flank;      // closed flank of each shaft with play, 0: none
     auto operator<=>(const Mode&) const = default;
 };
 

@@ -31,8 +31,16 @@ Solver::Solver(const System& system, Sharing sharing)
         mode.x.push_back(1);
         mode.at_rest.push_back(mesh.lossy() && w == 0);
     }
+    for (const auto& play : system.plays) mode.flank.push_back(play.pressed(twist(play, z), rate(play, z)));
     force_ = Vector::Zero(system.masses);
     extra_ = Vector::Zero(system.extras);
+}
+
+double Solver::twist(const System::Play& play, const Vector& state) const {
+    return state[system_.masses + play.shaft];
+}
+double Solver::rate(const System::Play& play, const Vector& state) const {
+    return system_.shaft_columns.col(play.shaft).dot(state.head(system_.masses));
 }
 
 double Solver::speed_scale(const Vector& state) const {
@@ -47,6 +55,11 @@ void Solver::note(double time, const std::string& device, const char* what) {
 
 void Solver::free_torque(When when, const Vector& state, const Mode& trial, Vector& out) {
     system_.force(when, state, out, extra_);
+    for (std::size_t p = 0; p < system_.plays.size(); ++p) {
+        const auto& play = system_.plays[p];
+        out -= system_.shaft_columns.col(play.shaft) *
+               play.torque(trial.flank[p], twist(play, state), rate(play, state));
+    }
     for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
         const double s = sign_of(trial.friction[f]);
         if (s == 0) continue;
@@ -334,7 +347,8 @@ void Solver::begin(double inside) {
 
 void Solver::margins(When when, const Vector& state, Vector& g) {
     solve(when, state, mode, work_);
-    g.resize(static_cast<Eigen::Index>(2 * system_.frictions.size() + 2 * system_.meshes.size()));
+    g.resize(static_cast<Eigen::Index>(2 * system_.frictions.size() + 2 * system_.meshes.size() +
+                                       system_.plays.size()));
     const double speed_tolerance = 1e-12 * speed_scale(state);
     // Twice what consistent() asks for: a mode it accepts is not left at once.
     const double torque_tolerance = 2e-9 * (work_.free.lpNorm<Eigen::Infinity>() + 1e-6);
@@ -374,6 +388,11 @@ void Solver::margins(When when, const Vector& state, Vector& g) {
         g[i++] = first;
         g[i++] = second;
     }
+    for (std::size_t p = 0; p < system_.plays.size(); ++p) {
+        const auto& play = system_.plays[p];
+        g[i++] = play.margin(mode.flank[p], twist(play, state), rate(play, state)) +
+                 1e-12 * (play.stiffness * play.half_gap + play.damping);
+    }
 }
 
 bool Solver::violated(When when, const Vector& state) {
@@ -384,6 +403,13 @@ bool Solver::violated(When when, const Vector& state) {
 // Closes pairs whose slip has just changed sign at (when, z) and brings the mode up to date.
 void Solver::apply_violations(When when) {
     margins(when, z, margins_);
+    const auto first_play = static_cast<std::size_t>(margins_.size()) - system_.plays.size();
+    for (std::size_t p = 0; p < system_.plays.size(); ++p) {
+        if (margins_[static_cast<Eigen::Index>(first_play + p)] >= 0) continue;
+        const auto& play = system_.plays[p];
+        mode.flank[p] = mode.flank[p] != 0 ? 0 : play.pressed(twist(play, z), rate(play, z));
+        note(when.t, play.name, mode.flank[p] != 0 ? "closes" : "opens");
+    }
     bool joined = false;
     for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
         if (sign_of(mode.friction[f]) == 0 || margins_[static_cast<Eigen::Index>(2 * f)] >= 0) continue;

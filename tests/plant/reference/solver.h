@@ -78,6 +78,8 @@ class Solver {
     void note(double time, const std::string& device, const char* what);
     double acceleration_tolerance(const Vector& column, const Torques& torques) const;
     double speed_scale(const Vector& state) const;
+    double twist(const System::Play& play, const Vector& state) const;
+    double rate(const System::Play& play, const Vector& state) const;
     struct Energy {
         double input = 0, dissipated = 0;
     };

@@ -107,7 +107,7 @@ System::System(const plant::Description& d) {
         shaft_columns.col(e) += unit(masses, mass(b.a)) - unit(masses, mass(b.b));
         stiffness[e] = damping[e] = 0;
         start[masses + e] = b.initial_twist;
-        plays.push_back({e, b.stiffness, b.damping, 0.5 * b.gap});
+        plays.push_back({b.name, e, b.stiffness, b.damping, 0.5 * b.gap});
     }
     damper = Matrix::Zero(masses, masses);
     for (const auto& k : d.dampers) {
@@ -172,10 +172,6 @@ void System::force(When when, const Vector& z, Vector& out, Eigen::Ref<Vector> e
     for (int e = 0; e < shafts; ++e) {
         const auto column = shaft_columns.col(e);
         out.noalias() -= column * (stiffness[e] * z[masses + e] + damping[e] * column.dot(omega));
-    }
-    for (const Play& play : plays) {
-        const auto column = shaft_columns.col(play.shaft);
-        out.noalias() -= column * play.torque(z[masses + play.shaft], column.dot(omega));
     }
     for (std::size_t s = 0; s < sources.size(); ++s) {
         const double w = z[source_mass[s]];

@@ -95,14 +95,28 @@ struct System {
     Vector inertia;
     Matrix shaft_columns;  // masses × shafts
     Vector stiffness, damping;
-    // A shaft with play has its twist among the shafts, at their end, and its torque from here: no states, no events.
+    // A shaft with play has its twist among the shafts, at their end; its torque depends on the flank that is closed, ±1 or
+    // 0, which belongs to the mode.
     struct Play {
+        std::string name;
         int shaft;
         double stiffness, damping, half_gap;
-        double torque(double twist, double rate) const {
-            if (twist > half_gap) return std::max(0.0, stiffness * (twist - half_gap) + damping * rate);
-            if (twist < -half_gap) return std::min(0.0, stiffness * (twist + half_gap) + damping * rate);
+        double torque(int flank, double twist, double rate) const {
+            return flank == 0 ? 0 : stiffness * (twist - flank * half_gap) + damping * rate;
+        }
+        // The flank that presses, or would if it were closed.
+        int pressed(double twist, double rate) const {
+            for (const int flank : {1, -1})
+                if (flank * twist >= half_gap && flank * torque(flank, twist, rate) > 0) return flank;
             return 0;
+        }
+        // Positive while the flank stays as it is.
+        double margin(int flank, double twist, double rate) const {
+            if (flank != 0) return flank * torque(flank, twist, rate);
+            const auto open = [&](int side) {
+                return std::max(stiffness * (half_gap - side * twist), -side * torque(side, twist, rate));
+            };
+            return std::min(open(1), open(-1));
         }
     };
     std::vector<Play> plays;
