@@ -23,7 +23,8 @@ double largest_torque(const ModelData& m, const Sample& s) {
 
 bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    const Sample &begin = w.scratch.begin, &half = w.scratch.half, &late = w.scratch.late, &end = w.scratch.end;
+    const Sample &begin = w.scratch.begin, &half = w.scratch.half, &late = w.scratch.late,
+                 &end = w.scratch.end;
     const double size = std::max(largest_torque(m, begin), largest_torque(m, end));
     // The last stage stands on an extrapolation: what it takes the forces to be, and what they are.
     double wrong = 0;
@@ -37,7 +38,8 @@ bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         double* difference = w.scratch.vector_c;
         double* change = w.scratch.vector_b;
         for (int k = 0; k < m.forces; ++k) difference[k] = end.f[k] - late.f[k];
-        m.kernel.multiply(w.scratch.used.from_late, padded(mode.order), m.forces, difference, nullptr, change);
+        m.kernel.multiply(w.scratch.used.from_late, padded(mode.order), m.forces, difference, nullptr,
+                          change);
         double fastest = 0, moved = 0;
         for (int j = 0; j < m.masses; ++j) fastest = std::max(fastest, std::fabs(end.z[j]));
         for (int i = 0; i < mode.order; ++i) {
@@ -52,8 +54,10 @@ bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     for (int e = 0; e < m.twists; ++e) {
         const auto& links = m.shaft_rate[static_cast<std::size_t>(e)];
         const int i = m.masses + e;
-        const double cubic = 0.5 * (begin.z[i] + end.z[i]) + h / 8 * (slip_fast(links, begin.z) - slip_fast(links, end.z));
-        hidden = std::max(hidden, m.structure.shafts[static_cast<std::size_t>(e)].stiffness * std::fabs(half.f[e - m.twists] - cubic));
+        const double cubic =
+            0.5 * (begin.z[i] + end.z[i]) + h / 8 * (slip_fast(links, begin.z) - slip_fast(links, end.z));
+        hidden = std::max(hidden, m.structure.shafts[static_cast<std::size_t>(e)].stiffness *
+                                      std::fabs(half.f[e - m.twists] - cubic));
     }
     return hidden > swing_tolerance * size;
 }

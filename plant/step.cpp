@@ -139,7 +139,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     // losses ([Algin] eq. (11), (14), (15), (16)–(25)); what cannot hold at t0+ opens (eq. (12)).
     Mode* mode = &begin_mode(w);
 
-    double length = 1;  // of a part, at most
+    double length = 1;             // of a part, at most
     int leans = m.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
     int dips = m.maximum_events;   // margins looked at where they are least
     const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.maximum_parts : 1);

@@ -38,13 +38,18 @@ Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end
 
 // Has a flank closed or opened half way that at the end is as it was? The part is too long for it.
 bool hides_contact(const Work& work) SHIFTRIG_REALTIME;
+
 // Where between begin and end the margin of a device that holds at both is so small that it may have been negative:
 // a slip that comes to zero and goes back, a torque that is too much for an instant. 1: nowhere.
-double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME;
+double first_dip(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
+
+// Does the state of this device fail to hold at the end sample? Bound slips are zero by others' doing.
+bool violated(const Work& work, const Mode& mode, int device, const Sample& end) SHIFTRIG_REALTIME;
 
 // How far from its change the device is at the sample: slip in the direction of its motion, capacity left, torque
 // beyond the point where both losses of a mesh agree, what a stuck mesh lacks to go. Negative: behind it.
-double crossing_margin(Work& work, const Mode& mode, const Crossing& crossing, Sample& sample) SHIFTRIG_REALTIME;
+double crossing_margin(Work& work, const Mode& mode, const Crossing& crossing,
+                       Sample& sample) SHIFTRIG_REALTIME;
 
 // Changes the state of one device at the sample, and with it of all that its closing brings to rest. False: a mesh at
 // rest takes over what is too much for it, and nothing begins to move.

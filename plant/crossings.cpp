@@ -1,0 +1,239 @@
+// Which device changes first within a part of a step, and where.
+#include <algorithm>
+#include <cmath>
+
+#include "plant/devices.h"
+#include "plant/flanks.h"
+#include "plant/stuck_meshes.h"
+#include "plant/transitions.h"
+
+namespace shiftrig::plant::detail {
+namespace {
+
+// Power that turns round by less is corrected, not located: loss that changes, of the largest torque.
+constexpr double small_loss = 1e-4, small_loss_of_parts = 1e-7;
+
+// Root in [0, 1] of the parabola through g(0), its slope there (per unit length) and g(1) < 0.
+double parabola_root(double g0, double slope, double g1) {
+    if (g0 <= 0) {
+        if (slope <= 0) return 0;
+        g0 = 0;
+    }
+    const double a = g1 - g0 - slope;
+    const double root = std::sqrt(std::max(0., slope * slope - 4 * a * g0));
+    const double q = -0.5 * (slope + (slope < 0 ? -root : root));
+    double theta = g0 == 0 ? (a != 0 ? -slope / a : 1) : q > 0 ? g0 / q : a != 0 ? q / a : 1;
+    if (!(theta >= 0 && theta <= 1)) theta = a != 0 ? q / a : 1;
+    return std::clamp(theta, 0., 1.);
+}
+
+double margin(const Work& w, int device, const Sample& s) {
+    if (device >= w.model.first_flank) return flank_margin(w, backlash_of(w, device), s);
+    const unsigned char state = w.contact[device];
+    if (device >= w.model.pairs) return motion_sign(state) * device_slip(w, device, s.z);
+    if (state == locked) {
+        const FreewheelLaw* law = freewheel_of(w, device);
+        return law ? freewheel_margin(*law, s.torque[device])
+                   : s.holding[device] - std::fabs(s.torque[device]);
+    }
+    return slip_sign(state) * device_slip(w, device, s.z);
+}
+
+double turning_margin(const Work& w, int device, const Sample& s) {
+    const unsigned char state = w.contact[device];
+    const double sign = motion_sign(state);
+    return (s.torque[device] - loss_kink(w, device - w.model.pairs, sign)) * sign * loss_exponent(state);
+}
+
+// Is every state good until the end of the part? The usual answer, quickly; a no only sends us to look closely.
+bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
+    const ModelData& m = w.model;
+    // Pairs that slip carry no internal torque, and the slip of locked ones has no sign.
+    double reserve = 0, forward = 0;  // the least of all, 0 if there is some everywhere
+    for (int k = 0; k < m.pairs; ++k) {
+        reserve = std::min(reserve, end.holding[k] - std::fabs(end.torque[k]));
+        forward = std::min(forward, slip_sign(w.contact[k]) * end.slip[k]);
+    }
+    if (reserve < 0 || forward < 0) return false;
+    if (mode.rests) return false;
+    double moving = 0, driving = 0;
+    for (const int k : m.lossy_meshes) {
+        const unsigned char state = w.contact[m.pairs + k];
+        const double sign = motion_sign(state), x = loss_exponent(state);
+        const double slip =
+            mode.tree ? slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z) : end.motion[k];
+        moving = std::min(moving, sign * slip);
+        driving = std::min(driving, (end.torque[m.pairs + k] - loss_kink(w, k, sign)) * (sign * x));
+    }
+    return !(moving < 0 || driving < 0);
+}
+
+// What a locked freewheel would have to pass on against its sense, all_hold() does not see.
+bool freewheels_hold(const Work& w, const Sample& end) {
+    for (const FreewheelLaw& law : w.model.freewheels) {
+        if (w.contact[law.pair] == locked && freewheel_margin(law, end.torque[law.pair]) < 0) return false;
+    }
+    return true;
+}
+
+// What holds half way, and the internal torques there: a stage knows neither. Its coordinates (on a tree, everything but
+// the torques) are there.
+void complete_half(Work& w, const Mode& mode) {
+    if (mode.tree) return internal_torques(w, mode, w.scratch.half);
+    evaluate_forces(w, w.contact, w.scratch.half);
+    active_torques(w.model, mode, w.scratch.half);
+}
+
+}  // namespace
+
+bool violated(const Work& w, const Mode& mode, int device, const Sample& end) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const unsigned char state = w.contact[device];
+    if (device < m.pairs) {
+        if (state == locked) return is_overloaded(w, device, end);
+        if (state == free_running || mode.bound[device]) return false;
+    } else if (state == stuck || mode.bound[device] || !mesh_of(w, device - m.pairs).lossy()) {
+        return false;
+    }
+    const double sign = device < m.pairs ? slip_sign(state) : motion_sign(state);
+    const double slip = sign * device_slip(w, device, end.z);
+    return slip < 0 && slip < -1e-13 * slip_scale(w, device, end.z);
+}
+
+double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Sample& s) SHIFTRIG_REALTIME {
+    switch (crossing.change) {
+        case Change::state:
+        case Change::overrun:
+        case Change::flank:
+            return margin(w, crossing.device, s);
+        case Change::turn:
+            return turning_margin(w, crossing.device, s);
+        case Change::release:
+            return -release_drive(w, mode, crossing.device - w.model.pairs, s);
+        case Change::limit:
+            return loss_left(w, crossing.device - w.model.pairs, s);
+    }
+    return 0;
+}
+
+double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const Sample &begin = w.scratch.begin, &half = w.scratch.half, &end = w.scratch.end;
+    double first = 1;
+    if (mode.tree) return first;
+    // The least of the parabola through three margins; that they are about to vanish is enough to look closer.
+    const auto consider = [&](double g0, double gm, double g1) {
+        const double slope = 4 * gm - 3 * g0 - g1, bend = 2 * (g0 - 2 * gm + g1);
+        if (!(slope < 0 && slope + 2 * bend > 0 && g0 >= 0 && g1 > 0))
+            return;  // falling at first, rising at last
+        const double theta = -0.5 * slope / bend;
+        if (theta > 0.02 && theta < 0.98 && g0 + 0.5 * slope * theta < 0.1 * std::min(g0, g1))
+            first = std::min(first, theta);
+    };
+    // What has just been let go begins at zero: it may be driven back at first.
+    const auto begun = [](double slip) { return std::fabs(slip) < at_rest ? 0 : slip; };
+    bool torques_known = false;
+    for (int k = 0; k < m.pairs; ++k) {
+        const unsigned char state = w.contact[k];
+        if (slips(state)) {
+            const double sign = slip_sign(state);
+            consider(begun(sign * begin.slip[k]), sign * half.slip[k], sign * end.slip[k]);
+        } else if (state == locked && std::fabs(end.torque[k]) > 0.8 * end.holding[k] &&
+                   !freewheel_of(w, k)) {
+            if (!torques_known) complete_half(w, mode);
+            torques_known = true;
+            consider(margin(w, k, begin), margin(w, k, half), margin(w, k, end));
+        }
+    }
+    for (const int k : m.lossy_meshes) {
+        const unsigned char state = w.contact[m.pairs + k];
+        if (state == stuck || mode.bound[m.pairs + k]) continue;
+        const double sign = motion_sign(state);
+        consider(begun(sign * begin.motion[k]), sign * half.motion[k], sign * end.motion[k]);
+    }
+    return first;
+}
+
+Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    w.scratch.turned = false;
+    Crossing first;
+    if (all_hold(w, mode, end) && freewheels_hold(w, end) && flanks_hold(w, end)) return first;
+    bool rates_known = false, middle_known = false, begin_known = false;
+    for (int k = 0; k < m.first_flank; ++k) {
+        if (!violated(w, mode, k, end)) continue;
+        double theta;
+        Change change = Change::state;
+        if (k < m.pairs && w.contact[k] == locked) {
+            if (!middle_known) complete_half(w, mode);
+            middle_known = true;
+            const double g0 = margin(w, k, begin), gm = margin(w, k, w.scratch.half), g1 = margin(w, k, end);
+            theta = g0 <= 0 ? 0 : parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
+            const FreewheelLaw* law = freewheel_of(w, k);
+            if (law && is_next_to_overrun(*law, end.torque[k])) change = Change::overrun;
+        } else {
+            if (!rates_known) sample_rate(w, mode, begin);
+            rates_known = true;
+            const double sign = k < m.pairs ? slip_sign(w.contact[k]) : motion_sign(w.contact[k]);
+            const double length = end.at.time - begin.at.time;
+            theta = parabola_root(margin(w, k, begin), sign * device_slip(w, k, begin.rate) * length,
+                                  margin(w, k, end));
+        }
+        if (first.device < 0 || theta < first.theta) first = {k, theta, change};
+    }
+    for (const BacklashLaw& law : m.backlashes) {
+        if (!is_flank_violated(w, law, end)) continue;
+        const double g0 = flank_margin(w, law, begin), g1 = flank_margin(w, law, end);
+        const double gm = flank_margin_half_way(w, law);
+        const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
+        if (first.device < 0 || theta < first.theta) first = {law.device, theta, Change::flank};
+    }
+    for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
+        const int leader = mode.rows[r] - m.pairs - m.meshes;
+        const double drive = release_drive(w, mode, leader, end);
+        if (drive <= 0) {
+            const double left = loss_left(w, leader, end);
+            if (left >= 0) continue;
+            if (!begin_known) internal_torques(w, mode, begin);
+            begin_known = true;
+            const double before = loss_left(w, leader, begin);
+            const double theta = before / (before - left);
+            if (before > 0 && (first.device < 0 || theta < first.theta))
+                first = {m.pairs + leader, theta, Change::limit};
+            continue;
+        }
+        const double before = std::min(release_drive(w, mode, leader, begin), 0.);
+        const double theta = before / (before - drive);
+        if (first.device < 0 || theta < first.theta) first = {m.pairs + leader, theta, Change::release};
+    }
+    w.scratch.turned = false;
+    double size = 0;
+    const double small = m.maximum_parts == 1 ? small_loss : small_loss_of_parts;
+    for (int k = m.pairs; k < m.first_flank; ++k) {
+        if (w.contact[k] == stuck || mode.bound[k] || !mesh_of(w, k - m.pairs).lossy()) continue;
+        const double g1 = turning_margin(w, k, end);
+        if (g1 >= 0) continue;
+        w.scratch.turned = true;
+        if (mode.tree) continue;
+        if (size == 0) size = torque_scale(w, end);
+        if (g1 * loss_difference(mesh_of(w, k - m.pairs)) >= -small * size) continue;
+        if (!middle_known) complete_half(w, mode);
+        middle_known = true;
+        const double g0 = turning_margin(w, k, begin), gm = turning_margin(w, k, w.scratch.half);
+        if (g0 <= 0) continue;  // just turned: it is within rounding of the point where both losses agree
+        const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
+        if (first.device < 0 || theta < first.theta) first = {k, theta, Change::turn};
+    }
+    return first;
+}
+
+bool hides_contact(const Work& w) SHIFTRIG_REALTIME {
+    for (const BacklashLaw& law : w.model.backlashes) {
+        if (is_flank_violated(law, flank_margin_half_way(w, law)) &&
+            !is_flank_violated(w, law, w.scratch.end))
+            return true;
+    }
+    return false;
+}
+
+}  // namespace shiftrig::plant::detail

@@ -1,0 +1,28 @@
+// Flanks of shafts with play (laws/backlash.h): when they open and close. Internal to plant/.
+#pragma once
+
+#include "plant/forces.h"
+
+namespace shiftrig::plant::detail {
+
+inline const BacklashLaw& backlash_of(const Work& w, int device) {
+    return w.model.backlashes[static_cast<std::size_t>(device - w.model.first_flank)];
+}
+
+// In torque: what a closed flank still presses with, how far the nearer of two open ones is from pressing [Nm].
+double flank_margin(const Work& work, const BacklashLaw& law, const Sample& sample) SHIFTRIG_REALTIME;
+// The same half way through a part, of which only coordinates and slips are there.
+double flank_margin_half_way(const Work& work, const BacklashLaw& law) SHIFTRIG_REALTIME;
+
+// Not by rounding: a tooth at rest that touches without load stays as it is.
+inline bool is_flank_violated(const BacklashLaw& law, double margin) noexcept {
+    return margin < -1e-12 * (law.stiffness * law.half_gap + law.damping);
+}
+bool is_flank_violated(const Work& work, const BacklashLaw& law, const Sample& sample) SHIFTRIG_REALTIME;
+bool flanks_hold(const Work& work, const Sample& end) SHIFTRIG_REALTIME;
+
+// Strain of a flank that opens is lost in its damper; what it has where it closes, by as much as that is beside the
+// very instant, is booked with its sign.
+void change_flank(Work& work, const BacklashLaw& law, Sample& sample) SHIFTRIG_REALTIME;
+
+}  // namespace shiftrig::plant::detail

@@ -1,0 +1,186 @@
+// Contact states and loss directions in agreement with an instant.
+#include "plant/settling.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plant/stuck_meshes.h"
+
+namespace shiftrig::plant::detail {
+namespace {
+
+// On the engine for long chains, lossy meshes that others hold at rest carry torque without loss. On the other one they
+// may lean on their loss, see lean_on_losses().
+bool rest_bound_meshes(const Work& w, const Mode& mode, unsigned char* contact) {
+    if (!mode.tree) return false;
+    bool changed = false;
+    for (int k = w.model.pairs; k < w.model.first_flank; ++k) {
+        if (contact[k] == stuck || !mode.bound[k] || !mesh_of(w, k - w.model.pairs).lossy()) continue;
+        contact[k] = stuck;
+        changed = true;
+    }
+    return changed;
+}
+
+// Pairs by their capacity: none is free, some engages. [Algin]: a change of λ by pressure.
+bool engage_and_release(Work& w, Sample& s) {
+    const ModelData& m = w.model;
+    bool changed = false;
+    for (int k = 0; k < m.pairs; ++k) {
+        const bool capable = s.sliding[k] > 0 || s.holding[k] > 0 || is_pressed(w, k, s.at);
+        if (capable != (w.contact[k] == free_running)) continue;
+        const double slip = slip_of(pair_links(w, k), s.z);
+        if (!capable && w.contact[k] != free_running) {
+            log_event(w, EventKind::release, k, s.at.time, s.torque[k], 0, slip);
+            w.contact[k] = free_running;
+            changed = true;
+        } else if (capable && w.contact[k] == free_running) {
+            if (std::fabs(slip) > at_rest) {
+                log_event(w, EventKind::engage, k, s.at.time, 0, s.sliding[k], slip);
+                w.contact[k] = slipping(slip);
+            } else {
+                change_state(w, k, s);
+            }
+            changed = true;
+        }
+    }
+    if (changed) contact_forces(w, w.contact, s);
+    return changed;
+}
+
+// The sense in which a locked pair begins to slip: that of its torque. A freewheel that lets go does so at next to none.
+double opening_sense(const Work& w, int pair, double torque) {
+    const FreewheelLaw* law = freewheel_of(w, pair);
+    if (!law) return torque;
+    return is_next_to_overrun(*law, torque) ? -law->sense : law->sense;
+}
+
+// Closings are told with the torques that they lead to.
+void tell_closings(Work& w, const Sample& s) {
+    const int count = std::min(w.outputs.event_count, Outputs::event_capacity);
+    for (int& i = w.scratch.told_events; i < count; ++i) {
+        Event& event = w.outputs.events[static_cast<std::size_t>(i)];
+        if (event.kind == EventKind::lock) {
+            event.torque = s.torque[event.device];
+        } else if (event.kind == EventKind::mesh_sticks) {
+            const LossAtRest loss = loss_at_rest(w, event.device - w.model.pairs, s);
+            event.torque = loss.needed;
+            event.capacity = loss.allowed;
+        }
+    }
+}
+
+}  // namespace
+
+Mode& find_directions(Work& w, unsigned char* contact, Sample& s, bool complete) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const int most = 2 * m.meshes + 2;
+    for (int flips = 0;; ++flips) {
+        Mode& mode = find_mode(m, w.operators, contact, w.scratch);
+        ++w.outputs.certificate.mode_lookups;
+        if (rest_bound_meshes(w, mode, contact)) {
+            contact_forces(w, contact, s);
+            complete = false;
+            continue;
+        }
+        if (!complete) internal_torques(w, mode, s);
+        complete = false;
+        int worst = -1;
+        double largest = -1;  // 1e-9 of the torque scale, once somebody asks
+        for (int k = 0; k < m.meshes; ++k) {
+            const unsigned char state = contact[m.pairs + k];
+            if (state == stuck || !m.lossy[static_cast<std::size_t>(k)]) continue;
+            const double sign = motion_sign(state);
+            const double torque = s.torque[m.pairs + k] - loss_kink(w, k, sign);
+            const int x = torque * sign < 0 ? -1 : 1;
+            if (x == loss_exponent(state)) continue;
+            if (largest < 0) largest = 1e-9 * torque_scale(w, s);
+            if (std::fabs(torque) > largest) {
+                largest = std::fabs(torque);
+                worst = k;
+            }
+        }
+        if (worst < 0) return mode;
+        if (flips >= most) {
+            w.outputs.certificate.flags |= 2;
+            return mode;
+        }
+        contact[m.pairs + worst] ^= driven;
+        contact_forces(w, contact, s);
+    }
+}
+
+Use most_used(const Work& w, const unsigned char* contact, const Sample& s) SHIFTRIG_REALTIME {
+    Use worst;
+    for (int k = 0; k < w.model.pairs; ++k) {
+        if (contact[k] != locked) continue;
+        const double use = std::fabs(s.torque[k]) / static_limit(w, k, s);
+        if (use > worst.share && (use <= overload || is_overloaded(w, k, s))) worst = {k, use};
+    }
+    return worst;
+}
+
+void open_pair(Work& w, const Mode& mode, int pair, Sample& s) SHIFTRIG_REALTIME {
+    for (int k = w.model.pairs; k < w.model.first_flank; ++k) {
+        if (mode.bound[k] && mesh_of(w, k - w.model.pairs).lossy()) w.contact[k] = stuck;
+    }
+    log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], static_limit(w, pair, s), 0);
+    w.contact[pair] = slipping(opening_sense(w, pair, s.torque[pair]));
+    w.scratch.overcome[static_cast<std::size_t>(pair)] = !mode.tree;
+    contact_forces(w, w.contact, s);
+}
+
+bool lean_on_losses(Work& w, const Mode& mode, double use, Sample& s) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    if (mode.tree) return false;
+    unsigned char* trial = w.scratch.trial.data();
+    bool found = false, tried = false;
+    for (int k = m.pairs; k < m.first_flank; ++k) {
+        if (!mesh_of(w, k - m.pairs).lossy() || (w.contact[k] != stuck && !mode.bound[k])) continue;
+        if (!tried) std::copy(s.torque, s.torque + m.torques, w.scratch.torque_copy.data());
+        tried = true;
+        for (const double direction : {1., -1.}) {
+            if (w.contact[k] != stuck && motion_sign(w.contact[k]) == direction) continue;
+            std::copy(w.contact, w.contact + m.contact_bytes, trial);
+            trial[k] = moving(direction,
+                              w.scratch.torque_copy[static_cast<std::size_t>(k)] * direction < 0 ? -1 : 1);
+            contact_forces(w, trial, s);
+            const Mode& leaning = find_directions(w, trial, s);
+            const double relieved = most_used(w, w.contact, s).share;
+            if (!leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
+            use = relieved;
+            found = true;
+            std::copy(trial, trial + m.contact_bytes, w.scratch.release.data());
+        }
+    }
+    if (!tried) return false;
+    if (found) std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);
+    contact_forces(w, w.contact, s);
+    if (!found) internal_torques(w, mode, s);
+    return found;
+}
+
+Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
+    if (!complete) {
+        look(w.model, find_mode(w.model, w.operators, w.contact, w.scratch), s);
+        evaluate_forces(w, w.contact, s);
+    }
+    if (engage_and_release(w, s)) complete = false;
+    const int most_passes = 2 * w.model.contact_bytes + 2;
+    for (int passes = 0;; ++passes, complete = false) {
+        Mode& mode = find_directions(w, w.contact, s, complete);
+        if (passes <= most_passes) {
+            if (release_stuck_meshes(w, mode, s) || leave_to_pairs(w, mode, s)) continue;
+            const Use worst = most_used(w, w.contact, s);
+            if (is_overloaded(w, worst.pair, s)) {
+                if (!lean_on_losses(w, mode, worst.share, s)) open_pair(w, mode, worst.pair, s);
+                continue;
+            }
+        }
+        if (w.scratch.told_events < w.outputs.event_count) tell_closings(w, s);
+        std::fill(w.scratch.overcome.begin(), w.scratch.overcome.end(), static_cast<unsigned char>(0));
+        return mode;
+    }
+}
+
+}  // namespace shiftrig::plant::detail

@@ -1,0 +1,29 @@
+// Lossy meshes at rest: what they take to stay so, and whether they go. Internal to plant/.
+#pragma once
+
+#include "plant/forces.h"
+
+namespace shiftrig::plant::detail {
+
+// What a stuck mesh takes to stay at rest, and the loss it has at its torque if it moves that way.
+struct LossAtRest {
+    double needed, allowed;
+};
+LossAtRest loss_at_rest(const Work& work, int mesh, const Sample& sample) SHIFTRIG_REALTIME;
+// What is left of the loss that a stuck mesh can take [Nm].
+double loss_left(const Work& work, int mesh, const Sample& sample) SHIFTRIG_REALTIME;
+
+// A family is let go together, each member with the sign that the motion gives it. It goes if, one way and with
+// its own consistent losses, it accelerates that way. Where other stuck meshes hold it only together, one of those goes
+// with it. Returns the acceleration towards the better of all ways beyond rounding, positive if it goes, with the
+// states it then has in scratch.release; the sample is as before.
+double release_drive(Work& work, const Mode& mode, int leader, Sample& sample) SHIFTRIG_REALTIME;
+
+// Lets the first family go that does. Says whether one did.
+bool release_stuck_meshes(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+
+// A stuck mesh that nothing sets in motion, but whose loss would have to be more than it can be, stays at its limit, and a
+// pair at rest that had been at its own takes the rest: it locks. The counterpart of lean_on_losses().
+bool leave_to_pairs(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+
+}  // namespace shiftrig::plant::detail
