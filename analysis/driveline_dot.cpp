@@ -22,7 +22,9 @@ const char* shape(Kind kind) {
         case Kind::mass:
             return "box";
         case Kind::clutch:
+        case Kind::freewheel:
         case Kind::brake:
+        case Kind::sprag:
             return "parallelogram";
         case Kind::gear:
             return "circle";
@@ -32,6 +34,7 @@ const char* shape(Kind kind) {
         case Kind::converter:
             return "ellipse";
         case Kind::shaft:
+        case Kind::backlash:
         case Kind::damper:
             return "plain";
         case Kind::engine:

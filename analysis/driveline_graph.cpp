@@ -1,9 +1,12 @@
 #include "analysis/driveline_graph.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <deque>
 #include <map>
+
+#include "plant/connectors.h"
 
 namespace shiftrig::analysis {
 
@@ -17,6 +20,51 @@ std::string digits(double value) {
     return text;
 }
 
+// How a connector is drawn: its symbol, and the figure that stands at it.
+struct Look {
+    Kind kind;
+    std::string figure;
+};
+Look look_of(const plant::Shaft& s) {
+    return {Kind::shaft, digits(s.stiffness) + " Nm/rad"};
+}
+Look look_of(const plant::Backlash& b) {
+    return {Kind::backlash, digits(1e3 * b.gap) + " mrad"};
+}
+Look look_of(const plant::Damper& d) {
+    return {Kind::damper, digits(d.damping) + " Nm s/rad"};
+}
+Look look_of(const plant::Clutch& c) {
+    return {c.b.empty() ? Kind::brake : c.radius > 0 ? Kind::tyre : Kind::clutch, ""};
+}
+Look look_of(const plant::Freewheel& f) {
+    return {f.b.empty() ? Kind::sprag : Kind::freewheel, digits(f.rated_torque) + " Nm"};
+}
+Look look_of(const plant::Gear& g) {
+    return {Kind::gear, "u " + digits(g.ratio)};
+}
+Look look_of(const plant::Planetary& p) {
+    return {Kind::planetary, "u " + digits(p.ratio)};
+}
+Look look_of(const plant::BrixiusTyre& t) {
+    return {Kind::tyre, "r " + digits(t.radius) + " m"};
+}
+Look look_of(const plant::TorqueConverter&) {
+    return {Kind::converter, ""};
+}
+Look look_of(const plant::Engine&) {
+    return {Kind::engine, ""};
+}
+Look look_of(const plant::TorqueSource&) {
+    return {Kind::source, ""};
+}
+Look look_of(const plant::Road&) {
+    return {Kind::road, ""};
+}
+Look look_of(const plant::Plough&) {
+    return {Kind::plough, ""};
+}
+
 class Builder {
   public:
     explicit Builder(const plant::Description& machine) : machine_(machine) {}
@@ -28,35 +76,10 @@ class Builder {
             graph_.nodes.push_back(
                 {Kind::mass, mass.name, digits(mass.inertia) + (rotating ? " kg m²" : " kg")});
         }
-        for (const auto& shaft : machine_.shafts)
-            device(Kind::shaft, shaft.name, digits(shaft.stiffness) + " Nm/rad",
-                   {{shaft.a, ""}, {shaft.b, ""}});
-        for (const auto& damper : machine_.dampers)
-            device(Kind::damper, damper.name, digits(damper.damping) + " Nm s/rad",
-                   {{damper.a, ""}, {damper.b, ""}});
-        for (const auto& clutch : machine_.clutches)
-            device(clutch.b.empty()    ? Kind::brake
-                   : clutch.radius > 0 ? Kind::tyre
-                                       : Kind::clutch,
-                   clutch.name, "", {{clutch.a, ""}, {clutch.b, ""}});
-        for (const auto& gear : machine_.gears)
-            device(Kind::gear, gear.name, "u " + digits(gear.ratio), {{gear.a, ""}, {gear.b, ""}});
-        for (const auto& row : machine_.planetaries)
-            device(Kind::planetary, row.name, "u " + digits(row.ratio),
-                   {{row.sun, "sun"}, {row.ring, "ring"}, {row.carrier, "carrier"}});
-        for (const auto& tyre : machine_.tyres)
-            device(Kind::tyre, tyre.name, "r " + digits(tyre.radius) + " m",
-                   {{tyre.wheel, ""}, {tyre.body, ""}});
-        for (const auto& converter : machine_.converters)
-            device(Kind::converter, converter.name, "",
-                   {{converter.pump, "pump"}, {converter.turbine, "turbine"}});
-        for (const auto& engine : machine_.engines)
-            device(Kind::engine, engine.name, "", {{engine.mass, ""}});
-        for (const auto& source : machine_.sources)
-            device(Kind::source, source.name, "", {{source.mass, ""}});
-        for (const auto& road : machine_.roads) device(Kind::road, road.name, "", {{road.body, ""}});
-        for (const auto& plough : machine_.ploughs)
-            device(Kind::plough, plough.name, "", {{plough.body, ""}});
+        plant::for_each_connector(machine_, [&](const auto& connector) {
+            const Look look = look_of(connector);
+            device(look.kind, connector.name, look.figure, plant::ends(connector));
+        });
 
         place_in_columns();
         order_columns();
@@ -66,13 +89,14 @@ class Builder {
 
   private:
     // A link to the housing has an empty name and is not drawn as an edge.
+    template <std::size_t links>
     void device(Kind kind, const std::string& name, const std::string& figure,
-                const std::vector<std::pair<std::string, std::string>>& links) {
+                const std::array<plant::End, links>& ends) {
         const int node = static_cast<int>(graph_.nodes.size());
         graph_.nodes.push_back({kind, name, figure});
-        for (const auto& [mass, role] : links)
-            if (const auto found = masses_.find(mass); found != masses_.end())
-                graph_.edges.push_back({found->second, node, role});
+        for (const plant::End& end : ends)
+            if (const auto found = masses_.find(end.mass); found != masses_.end())
+                graph_.edges.push_back({found->second, node, end.role});
     }
 
     DrivelineGraph::Node& node(int index) { return graph_.nodes[static_cast<std::size_t>(index)]; }

@@ -13,13 +13,16 @@ struct DrivelineGraph {
     enum class Kind {
         mass,
         clutch,
+        freewheel,
         shaft,
+        backlash,
         damper,
         gear,
         planetary,
         tyre,
         converter,
         brake,  // hangs on one mass
+        sprag,  // a freewheel to the housing
         engine,
         source,
         road,

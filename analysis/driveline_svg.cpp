@@ -71,8 +71,13 @@ const char* word(Kind kind) {
             return "mass";
         case Kind::clutch:
             return "clutch";
+        case Kind::freewheel:
+        case Kind::sprag:
+            return "freewheel";
         case Kind::shaft:
             return "shaft";
+        case Kind::backlash:
+            return "backlash";
         case Kind::damper:
             return "damper";
         case Kind::gear:
@@ -102,10 +107,16 @@ std::string symbol(Kind kind) {
     switch (kind) {
         case Kind::clutch:
             return R"(<path d="M-20 0H-4M-4 -14V14M4 -14V14M4 0H20"/>)";
+        case Kind::freewheel:
+            return R"(<path d="M-20 0H-8M-8 -9V9L8 0ZM8 -9V9M8 0H20"/>)";
+        case Kind::sprag:
+            return R"(<path d="M0 -18V-9M-9 -9H9L0 4ZM-14 4H14M-14 4l-4 6M-5 4l-4 6M4 4l-4 6M13 4l-4 6"/>)";
         case Kind::brake:
             return R"(<path d="M0 -18V-6M-14 -6H14M-14 2H14M-14 2l-4 6M-5 2l-4 6M4 2l-4 6M13 2l-4 6"/>)";
         case Kind::shaft:
             return R"(<path d="M-20 0h4l4 -8 6 16 6 -16 6 16 6 -16 4 8h4"/>)";
+        case Kind::backlash:
+            return R"(<path d="M-20 0H-11M4 -11H-11V11H4M-3 0H20M-3 -6V6"/>)";
         case Kind::damper:
             return R"(<path d="M-20 0H-2M-2 -7V7M-8 -10H8V10H-8M8 0H20"/>)";
         case Kind::gear:

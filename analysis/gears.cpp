@@ -133,6 +133,10 @@ std::vector<Gear> gears_of(const plant::Description& description) {
             const int pair = structure.pair(clutch);
             if (pair < 0) continue;
             rigid.push_back(column_of(structure.pairs[static_cast<std::size_t>(pair)].links));
+            if (structure.pairs[static_cast<std::size_t>(pair)].kind == plant::PairKind::freewheel) {
+                seeds.push_back(rigid.back());  // locks by itself: nobody chooses a gear with it
+                continue;
+            }
             if (closed_in_every_gear(clutch)) {
                 gear.common.push_back(clutch);
             } else {

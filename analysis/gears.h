@@ -13,7 +13,7 @@ namespace shiftrig::analysis {
 struct Gear {
     std::string name;                    // of the gear path
     std::vector<std::string> selecting;  // its clutches that are not closed in every gear (F2)
-    std::vector<std::string> common;     // its clutches that are (Fc)
+    std::vector<std::string> common;     // its clutches that are (Fc); freewheels are in neither list
     // The ratio is measured across the gearbox proper, where no shaft's twist falsifies it: between the masses
     // nearest to the machine's input and output that are joined rigidly with the selecting clutches in this gear.
     std::string in, out;

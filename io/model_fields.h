@@ -70,6 +70,17 @@ void fields(Fields& f, plant::Shaft& s) {
 }
 
 template <class Fields>
+void fields(Fields& f, plant::Backlash& b) {
+    f.link("a", b.a, "mass at the first end");
+    f.link("b", b.b, "mass at the second end");
+    f.number("stiffness_nm_per_rad", b.stiffness, positive, "of the closed flanks");
+    f.number("damping_nm_s_per_rad", b.damping, not_negative, "damper parallel to it while they are closed");
+    f.number("gap_rad", b.gap, positive, "the whole play, from flank to flank");
+    f.optional_number("initial_twist_rad", b.initial_twist, any,
+                      "at the start, a ahead of b [0: in the middle]");
+}
+
+template <class Fields>
 void fields(Fields& f, plant::Damper& d) {
     f.link("a", d.a, "first mass");
     f.link_or_housing("b", d.b, "second mass, or housing");
@@ -211,6 +222,19 @@ void fields(Fields& f, plant::Clutch& c) {
     f.optional_number("radius_m", c.radius, positive, "makes it a wheel on a road: slip ω_a − v_b/radius");
     f.flag("initially_locked", c.initially_locked, "closed at the start");
     f.flag("drag", c.drag, "drag of the oil while open (needs oil)");
+}
+
+template <class Fields>
+void fields(Fields& w, plant::Freewheel& f) {
+    w.link("a", f.a, "first mass");
+    w.link_or_housing("b", f.b, "second mass, or housing: a sprag that holds a on one side");
+    w.choice("blocks", f.blocks,
+             Choices<plant::Sense>{{"forward", plant::Sense::forward}, {"backward", plant::Sense::backward}},
+             "sense of ω_a − ω_b that it does not let go: a cannot run ahead of b [forward], or fall behind");
+    w.number("rated_torque_nm", f.rated_torque, positive, "that it holds in that sense");
+    w.number("sliding_share", f.sliding_share, share,
+             "of the rated torque that is left while it slips overloaded");
+    w.optional_number("drag_torque_nm", f.drag_torque, not_negative, "while overrunning [0]");
 }
 
 // ---- rigid devices -----------------------------------------------------------------------------------
@@ -374,7 +398,7 @@ void fields(Fields& f, plant::SpeedSensor& s) {
 
 template <class Fields>
 void fields(Fields& f, GearPathText& g) {
-    f.names("closed", g.closed, "clutches and brakes closed in it");
+    f.names("closed", g.closed, "clutches and brakes closed, freewheels locked in it");
     f.optional_integer("lever", g.lever, any,
                        "position of the lever that asks for it: −1 reverse, 1… forward");
 }
@@ -413,8 +437,10 @@ void fields(Fields& f, ModelText& model) {
           "maps that others take in with << and an anchor; not read themselves");
     f.section("masses", "mass", d.masses, "lumped masses; every link of a device ends on one");
     f.section("shafts", "shaft", d.shafts, "elastic shafts with their dampers");
+    f.section("backlashes", "backlash", d.backlashes, "elastic shafts with play");
     f.section("dampers", "damper", d.dampers, "between masses or to the housing");
     f.section("clutches", "clutch", d.clutches, "clutches, brakes, Coulomb wheel contacts");
+    f.section("freewheels", "freewheel", d.freewheels, "one-way clutches, sprags");
     f.section("gears", "gear", d.gears, "fixed-axis gears, range groups");
     f.section("planetaries", "planetary row", d.planetaries, "planetary rows");
     f.section("tyres", "tyre", d.tyres, "Brixius traction with relaxation");

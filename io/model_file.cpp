@@ -32,6 +32,8 @@ class ModelReader {
         file_.places = std::move(context_.places);
         file_.can = model_.can;
         for (const auto& clutch : file_.description.clutches) clutches_.push_back(clutch.name);
+        closable_ = clutches_;
+        for (const auto& freewheel : file_.description.freewheels) closable_.push_back(freewheel.name);
         for (const auto& mass : file_.description.masses) masses_.push_back(mass.name);
         check_options();
         take_gear_paths();
@@ -62,12 +64,16 @@ class ModelReader {
                 refuse("gear", gear.name, "in_use", "in_use must be one of its options");
     }
 
+    void check_name(const std::string& kind, const std::string& device, const std::string& key,
+                    const std::string& name, const std::vector<std::string>& known, const char* what) const {
+        if (std::find(known.begin(), known.end(), name) == known.end())
+            refuse(kind, device, key,
+                   (key.empty() ? "" : key + " = " + name + "; ") + "must name " + what +
+                       nearest_hint(name, known));
+    }
     void check_clutch(const std::string& kind, const std::string& device, const std::string& key,
                       const std::string& name) const {
-        if (std::find(clutches_.begin(), clutches_.end(), name) == clutches_.end())
-            refuse(kind, device, key,
-                   (key.empty() ? "" : key + " = " + name + "; ") + "must name a clutch" +
-                       nearest_hint(name, clutches_));
+        check_name(kind, device, key, name, clutches_, "a clutch");
     }
 
     void check_mass(const char* key, const std::string& name) const {
@@ -78,7 +84,8 @@ class ModelReader {
 
     void take_gear_paths() {
         for (const auto& path : model_.gear_paths) {
-            for (const auto& clutch : path.closed) check_clutch("gear path", path.name, "closed", clutch);
+            for (const auto& device : path.closed)
+                check_name("gear path", path.name, "closed", device, closable_, "a clutch");
             file_.description.gear_paths.push_back({path.name, path.closed});
             if (path.lever == 0) continue;
             for (const auto& other : file_.controller.lever)
@@ -138,7 +145,7 @@ class ModelReader {
     ModelFile file_;
     ModelText model_;
     ReadContext context_;
-    std::vector<std::string> masses_, clutches_;
+    std::vector<std::string> masses_, clutches_, closable_;
 };
 
 // A ModelError's field is a member of plant/description.h; the key is that name with its unit.

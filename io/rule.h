@@ -31,6 +31,7 @@ inline constexpr Rule at_most_one{-unbounded, 1};
 inline constexpr Rule not_zero{-unbounded, unbounded, false, true};
 inline constexpr Rule fraction{0, 1};
 inline constexpr Rule efficiency{0, 1, true, false};
+inline constexpr Rule share = efficiency;
 }  // namespace rules
 
 }  // namespace shiftrig::io

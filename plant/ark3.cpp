@@ -54,7 +54,7 @@ void middle_sample(Work& w, const Mode& mode) {
 
 bool is_overloaded(const Work& w, const Sample& s) {
     for (int k = 0; k < w.model.pairs; ++k) {
-        if (w.contact[k] == locked && std::fabs(s.torque[k]) > s.holding[k]) return true;
+        if (w.contact[k] == locked && std::fabs(s.torque[k]) > static_limit(w, k, s)) return true;
     }
     return false;
 }

@@ -1,5 +1,5 @@
-// The state of everything that can change its state: friction pairs (the indicators λ of [Algin]) and
-// lossy meshes (their direction of motion s and of power flow x). One byte per device in the State block.
+// The state of everything that can change its state: friction pairs (the indicators λ of [Algin]), lossy meshes (their
+// direction of motion s and of power flow x), flanks of shafts with play. One byte per device in the State block.
 #pragma once
 
 #include <cstdint>
@@ -27,6 +27,16 @@ constexpr int loss_exponent(unsigned char mesh) noexcept {
 }
 constexpr unsigned char moving(double sign, int x) noexcept {
     return static_cast<unsigned char>(moves | (sign < 0 ? moves_backward : 0) | (x < 0 ? driven : 0));
+}
+
+// Shaft with play: open, or pressed on one of its flanks.
+enum FlankState : unsigned char { flanks_open = 0, flank_forward = 1, flank_backward = 2 };
+
+constexpr double flank_side(unsigned char flank) noexcept {
+    return flank == flank_forward ? 1. : flank == flank_backward ? -1. : 0.;
+}
+constexpr unsigned char closed_flank(double side) noexcept {
+    return side > 0 ? flank_forward : side < 0 ? flank_backward : flanks_open;
 }
 
 }  // namespace shiftrig::plant::detail

@@ -109,6 +109,7 @@ void build_view(const ModelData& m, const Mode& mode, const double* expansion, d
                 k < m.pairs && mode.bound[k];  // others hold it at zero: not even rounding is left
             *next++ = held ? 0 : slip(m.force_columns[static_cast<std::size_t>(k)], z);
         }
+        for (int k = 0; k < m.meshes; ++k) *next++ = slip(m.mesh_motion[static_cast<std::size_t>(k)], z);
         next = column + m.law_rows;
         for (int k = 0; k < m.meshes; ++k) *next++ = slip(m.mesh_loss[static_cast<std::size_t>(k)], z);
         for (const auto& shaft : m.shaft_rate) *next++ = slip(shaft, z);
@@ -158,6 +159,7 @@ void build_balance(const ModelData& m, Mode& mode, const double* expansion, doub
         }
     };
     for (int e = 0; e < m.twists; ++e) {
+        if (!is_shaft_closed(m, mode, e)) continue;
         const Elastic& shaft = s.shafts[static_cast<std::size_t>(e)];
         add(m.masses + e, shaft.stiffness, shaft.links);
         damped(shaft.damping, shaft.links);

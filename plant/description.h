@@ -32,6 +32,15 @@ struct Shaft {
     double initial_twist = 0;  // [rad], positive where a is ahead of b
 };
 
+// Elastic shaft with play: within the gap it passes on nothing, laws/backlash.h.
+struct Backlash {
+    std::string name, a, b;
+    double stiffness = 0;      // of the closed flanks [Nm/rad], > 0
+    double damping = 0;        // of the closed flanks [Nm s/rad], ≥ 0
+    double gap = 0;            // the whole play [rad], > 0
+    double initial_twist = 0;  // [rad], positive where a is ahead of b; 0: in the middle of the play
+};
+
 struct Damper {
     std::string name, a, b;  // b empty: to the housing
     double damping = 0;      // [Nm s/rad]
@@ -153,6 +162,18 @@ struct Clutch {
     bool drag = false;             // viscous drag of the open wet clutch, by oil viscosity
 };
 
+// One-way clutch (freewheel, sprag) between a and b, with b empty to the housing; laws/freewheel.h. It does not let
+// ω_a − ω_b go in the sense it blocks: forward, a cannot run ahead of b; backward, a cannot fall behind.
+enum class Sense { forward, backward };
+
+struct Freewheel {
+    std::string name, a, b;
+    Sense blocks = Sense::forward;
+    double rated_torque = 0;   // held in the blocked sense [Nm], > 0
+    double sliding_share = 0;  // of it that is left while the overloaded freewheel slips, in (0, 1]
+    double drag_torque = 0;    // while overrunning [Nm], ≥ 0
+};
+
 // ---- rigid devices -----------------------------------------------------------------------------------
 
 // Fixed-axis gear, u = u12 = ω_a/ω_b; efficiency η acts as û = u·η^x.
@@ -272,8 +293,10 @@ struct Description {
     std::string name;
     std::vector<Mass> masses;
     std::vector<Shaft> shafts;
+    std::vector<Backlash> backlashes;
     std::vector<Damper> dampers;
     std::vector<Clutch> clutches;      // clutches, brakes, Coulomb wheel contacts
+    std::vector<Freewheel> freewheels;
     std::vector<Gear> gears;
     std::vector<Planetary> planetaries;
     std::vector<BrixiusTyre> tyres;
@@ -292,7 +315,7 @@ struct Description {
     Method method = Method::automatic;
     int maximum_events = 4;               // K of numerics.md §4
     // A step is taken in up to this many parts where shafts swing or forces change too fast for one; 1: never.
-    // Bounds the cost of a step.
+    // Bounds the cost of a step. A backlash whose flanks are too stiff for that many raises both bounds (not 1).
     int maximum_parts = 16;
 };
 

@@ -90,7 +90,7 @@ void advance_engine_modes(Work& w) {
         const auto mode = static_cast<EngineMode>(static_cast<int>(at[0]));
         const EngineMode next =
             next_engine_mode(m.description.engines[e], mode, speed, start > 0.5 && at[2] <= 0.5, w.h, at[1]);
-        const int device = m.pairs + m.meshes + static_cast<int>(e);
+        const int device = m.contact_bytes + static_cast<int>(e);
         if (next != mode && next != EngineMode::cranking) {
             const EventKind kind =
                 next == EngineMode::stalled ? EventKind::engine_stalls : EventKind::engine_starts;
@@ -138,7 +138,9 @@ double torque_residual(Work& w, const Mode& mode, const Sample& s) {
     const ModelData& m = w.model;
     if (mode.row_count == 0) return 0;
     const int columns = mode.order + m.forces + mode.row_count;
-    const double* terms = s.f - mode.order;  // q, f, M
+    double* terms = w.scratch.vector_b;  // q, f, M side by side
+    std::copy(s.f - mode.order, s.f + m.forces, terms);
+    std::copy(s.active, s.active + mode.row_count, terms + mode.order + m.forces);
     double* rest = w.scratch.vector_a;
     m.kernel.multiply(mode.balance, padded(mode.row_count), columns, terms, nullptr, rest);
     const double scale = sum_of_squares(terms + mode.order, m.forces + mode.row_count);
@@ -200,7 +202,7 @@ Work begin_step(const ModelData& m, OperatorsData& operators, State& state, Outp
     } else {
         operators.carried = false;
         load_sample(m, block, time, scratch.begin);
-        scratch.stored_before = stored_energy(m, scratch.begin.z);
+        scratch.stored_before = stored_energy(m, scratch.begin.z, contact);
     }
     std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
@@ -267,7 +269,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     block[layout.energy] += s.input_work;
     block[layout.energy + 1] += s.dissipated;
 
-    s.stored = stored_energy(m, s.begin.z);
+    s.stored = stored_energy(m, s.begin.z, w.contact);
     certificate.energy_defect = s.stored - s.stored_before - s.input_work + s.dissipated;
     certificate.torque_residual = mode.tree ? s.torque_residual : torque_residual(w, mode, s.begin);
     certificate.constraint_violation = constraint_violation(mode, s.begin.z);
@@ -291,7 +293,7 @@ void finish_look(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         mode.tree ? w.scratch.torque_residual : torque_residual(w, mode, s);
     w.outputs.certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     w.outputs.event_count = 0;
-    w.scratch.stored = stored_energy(w.model, s.z);
+    w.scratch.stored = stored_energy(w.model, s.z, w.contact);
     fill_outputs(w, mode, s);
 }
 

@@ -42,6 +42,19 @@ void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcep
     }
 }
 
+// Overrunning freewheels pass on their drag only; in the other sense they are pairs like any other.
+void freewheel_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
+    for (const FreewheelLaw& law : w.model.freewheels) {
+        if (slip_sign(contact[law.pair]) * law.sense < 0) s.f[law.pair] = -law.sense * law.drag;
+    }
+}
+
+// ∓kδ of closed flanks: their torque is k φ of the mode and this.
+void flank_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
+    for (const BacklashLaw& law : w.model.backlashes)
+        s.f[law.force] = -flank_side(contact[law.device]) * law.stiffness * law.half_gap;
+}
+
 void bearing_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
     const ModelData& m = w.model;
     if (m.first_external == m.pairs) return;
@@ -85,6 +98,7 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
     for (std::size_t i = 0; i < m.road_mass.size(); ++i) {
         known.grade_forces[i] = grade_force(m.description.roads[i], input(w, m.grade), m.description.gravity);
     }
+    for (std::size_t i = 0; i < m.sources.size(); ++i) known.source_inputs[i] = input(w, m.sources[i].input);
     for (std::size_t i = 0; i < m.sensors.size(); ++i) {
         const SensorLaw& law = m.sensors[i];
         known.sensor_faults[i] = {input(w, law.bias), input(w, law.noise), input(w, law.stuck) > 0.5,
@@ -146,7 +160,8 @@ void law_forces(const Work& w, Sample& s) noexcept {
     for (std::size_t i = 0; i < m.sources.size(); ++i) {
         const TorqueSource& source = d.sources[i];
         const int force = m.sources[i].force;
-        double torque = waveform(source.waveform, s.at.time, s.at.side) + input(w, m.sources[i].input);
+        double torque = known.source_inputs[i];
+        if (!source.waveform.pieces.empty()) torque += waveform(source.waveform, s.at.time, s.at.side);
         if (source.quadratic != 0) torque += source.quadratic * s.slip[force] * std::fabs(s.slip[force]);
         s.f[force] += torque;
     }
@@ -170,6 +185,8 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHI
     }
     law_forces(w, s);
     pair_forces(w, contact, s);
+    freewheel_forces(w, contact, s);
+    flank_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }
 
@@ -209,6 +226,8 @@ void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
         const int k = scratch.dragging[static_cast<std::size_t>(i)];
         s.f[k] = open_drag(w, k, s);
     }
+    freewheel_forces(w, w.contact, s);
+    flank_forces(w, w.contact, s);
     bearing_forces(w, w.contact, s);
 }
 
@@ -219,6 +238,8 @@ void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIF
         if (contact[k] == free_running && m.pair_laws[static_cast<std::size_t>(k)].drag > 0)
             s.f[k] = open_drag(w, k, s);
     }
+    freewheel_forces(w, contact, s);
+    flank_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }
 

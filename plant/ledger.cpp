@@ -27,11 +27,14 @@ double mesh_losses(const ModelData& m, const Mode& mode, const double* mesh_torq
     return power[0] + power[1];
 }
 
-double damping_losses(const ModelData& m, const double* swing) {
+double damping_losses(const ModelData& m, const Mode& mode, const double* swing) {
     double power = 0;
     const auto count = static_cast<int>(m.swing_damping.size());
     const double* damping = m.swing_damping.data();
     for (int i = 0; i < count; ++i) power += damping[i] * swing[i] * swing[i];
+    for (const BacklashLaw& law : m.backlashes) {
+        if (is_shaft_closed(m, mode, law.shaft)) power += law.damping * swing[law.shaft] * swing[law.shaft];
+    }
     return power;
 }
 
@@ -59,7 +62,7 @@ Powers powers(const ModelData& m, const Mode& mode, const Sample& forces, const 
     double bearings = 0, external = 0;
     int k = m.pairs;
     for (const int end = m.first_external; k < end; ++k) bearings += f[k] * slip[k];
-    for (const int end = m.forces; k < end; ++k) external -= f[k] * slip[k];
+    for (const int end = m.first_flank_force; k < end; ++k) external -= f[k] * slip[k];
     // What tyres and converters lose goes through external forces: the rest of these is input.
     return {field + bearings + mesh_losses(m, mode, mesh_torques, motion.turning), external + field};
 }
@@ -132,14 +135,15 @@ void book_finely(Work& w, const Mode& mode) {
         active_torques(m, mode, at);
         const double weight = h / parts / 3 * (part == 0 || part == parts ? 1 : part % 2 ? 4 : 2);  // Simpson
         double loss =
-            mesh_losses(m, mode, at.active + mode.first_mesh, at.turning) + damping_losses(m, at.swing);
+            mesh_losses(m, mode, at.active + mode.first_mesh, at.turning) + damping_losses(m, mode, at.swing);
         for (int k = 0; k < m.first_external; ++k) {
             const double power = at.f[k] * at.slip[k];
             if (k < m.pairs) s.heat[static_cast<std::size_t>(k)] += weight * power;
             loss += power;
         }
         s.dissipated += weight * loss;
-        for (int k = m.first_external; k < m.forces; ++k) external_work -= weight * at.f[k] * at.slip[k];
+        for (int k = m.first_external; k < m.first_flank_force; ++k)
+            external_work -= weight * at.f[k] * at.slip[k];
         for (std::size_t i = 0; i < m.translating.size(); ++i) {
             w.next[m.layout.distances + static_cast<int>(i)] -= weight * at.slip[m.translating_force[i]];
         }
@@ -175,6 +179,13 @@ double stored_energy(const ModelData& m, const double* z) SHIFTRIG_REALTIME {
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
+double stored_energy(const ModelData& m, const double* z, const unsigned char* contact) SHIFTRIG_REALTIME {
+    double energy = stored_energy(m, z);
+    for (const BacklashLaw& law : m.backlashes)
+        energy += flank_energy(law, flank_side(contact[law.device]), z[m.masses + law.shaft]);
+    return energy;
+}
+
 void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
@@ -195,8 +206,8 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     } else {
         fill_middle(w, mode);
         damping = h / 6 *
-                  (damping_losses(m, begin.swing) + 4 * damping_losses(m, middle.swing) +
-                   damping_losses(m, end.swing));
+                  (damping_losses(m, mode, begin.swing) + 4 * damping_losses(m, mode, middle.swing) +
+                   damping_losses(m, mode, end.swing));
         double* last = s.vector_c;
         mesh_torques_with(w, mode, end, s.late.f, last);
         torques[0] = begin.torque + m.pairs;

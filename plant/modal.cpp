@@ -61,14 +61,17 @@ struct Spring {
     double leak = 0;  // of its twist [1/s]
 };
 
-std::vector<Spring> springs_of(const Description& d, const Structure& s, double body_speed) {
+std::vector<Spring> springs_of(const Description& d, const Structure& s, const ModalOptions& options) {
     std::vector<Spring> springs;
-    for (const Elastic& e : s.shafts) springs.push_back({e.name, e.links, e.stiffness, e.damping, 0});
+    for (const Elastic& e : s.shafts) {
+        if (e.gap > 0 && !options.closed_flanks) continue;
+        springs.push_back({e.name, e.links, e.stiffness, e.damping, 0});
+    }
     for (const Elastic& e : s.dampers) springs.push_back({e.name, e.links, 0, e.damping, 0});
     for (const BrixiusTyre& tyre : d.tyres) {
         const double slope = tyre_force_slope(tyre_soil(tyre, tyre.mobility_number));
         const double stiffness = slope * tyre.radius * tyre.radius / tyre.relaxation_length;
-        const double speed = std::fabs(body_speed);
+        const double speed = std::fabs(options.body_speed);
         const double damping = stiffness * tyre.slip_damping_time * tyre.relaxation_length /
                                (tyre.relaxation_length + tyre.slip_damping_time * speed);
         springs.push_back({tyre.name,
@@ -224,7 +227,7 @@ ModalResult natural_modes(const Description& d, const std::vector<std::string>& 
         if (clutch.radius > 0) locked.push_back(clutch.name);
     }
     const Eigen::MatrixXd basis = motions(rigid_set(d, s, locked, rigid), s.inertia);
-    const std::vector<Spring> springs = springs_of(d, s, options.body_speed);
+    const std::vector<Spring> springs = springs_of(d, s, options);
     const Eigen::MatrixXd a = columns_of(springs, s.masses());
     const Eigen::MatrixXd g = a.transpose() * basis;
 

@@ -8,7 +8,7 @@
 //         At a body speed V its twist leaks with the rate V/σ (damped modes only).
 //
 // Closed clutches and brakes are rigid, open ones transmit nothing; wheel contacts ([Algin] Fw) count as closed.
-// Linear in small motion: no backlash, no friction, loss-free meshes, converters and engines without stiffness.
+// Linear in small motion: flanks of shafts with play closed, no friction, loss-free meshes, converters and engines without stiffness.
 #pragma once
 
 #include <optional>
@@ -62,7 +62,8 @@ struct ModalResult {
 };
 
 struct ModalOptions {
-    double body_speed = 0;  // V for the damped modes [m/s]
+    double body_speed = 0;      // V for the damped modes [m/s]
+    bool closed_flanks = true;  // shafts with play press; false: their play is open
 };
 
 ModalResult natural_modes(const Description& description, const std::vector<std::string>& closed,

@@ -113,9 +113,10 @@ ModeSizes::ModeSizes(const ModelData& m) {
 
 void mode_key(const ModelData& m, const unsigned char* contact, unsigned char* key) SHIFTRIG_REALTIME {
     for (int k = 0; k < m.pairs; ++k) key[k] = contact[k] == locked;
-    for (int k = m.pairs; k < m.contact_bytes; ++k) {
+    for (int k = m.pairs; k < m.first_flank; ++k) {
         key[k] = contact[k] == stuck ? 0 : contact[k] & driven ? 2 : 1;
     }
+    for (int k = m.first_flank; k < m.contact_bytes; ++k) key[k] = contact[k] != flanks_open;
 }
 
 int workspace_doubles(const ModelData& m) noexcept {
@@ -298,12 +299,11 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
     };
     for (int e = 0; e < m.twists; ++e) {
         const Elastic& shaft = s.shafts[static_cast<std::size_t>(e)];
+        for (const Link& link : shaft.links) motion[link.mass * states + n + e] = link.factor;  // φ̇
+        if (!is_shaft_closed(m, mode, e)) continue;
         apply(shaft.links);
         add_to(n + e, shaft.stiffness);
-        for (const Link& link : shaft.links) {
-            add_to(link.mass, shaft.damping * link.factor);
-            motion[link.mass * states + n + e] = link.factor;  // φ̇
-        }
+        for (const Link& link : shaft.links) add_to(link.mass, shaft.damping * link.factor);
     }
     for (const Elastic& damper : s.dampers) {
         apply(damper.links);

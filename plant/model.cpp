@@ -114,6 +114,14 @@ void build_laws(ModelData& m) {
         PairLaw law;
         switch (pair.kind) {
             case PairKind::clutch: law = clutch_law(m, d.clutches[static_cast<std::size_t>(pair.source)], actuator_slots); break;
+            case PairKind::freewheel: {
+                const Freewheel& f = d.freewheels[static_cast<std::size_t>(pair.source)];
+                law.source = LoadSource::rated;
+                law.full_load = f.rated_torque;
+                law.freewheel = static_cast<int>(m.freewheels.size());
+                m.freewheels.push_back(freewheel_law(f, static_cast<int>(m.pair_laws.size())));
+                break;
+            }
             case PairKind::rolling:
                 law.source = LoadSource::rolling;
                 law.full_load = rolling_moment(d.tyres[static_cast<std::size_t>(pair.source)]);
@@ -122,6 +130,8 @@ void build_laws(ModelData& m) {
             case PairKind::engine_friction: law.source = LoadSource::engine; break;
         }
         if (pair.kind != PairKind::clutch) law.friction.base = law.friction.static_factor = 1;
+        if (law.freewheel >= 0)
+            law.friction.base = d.freewheels[static_cast<std::size_t>(pair.source)].sliding_share;
         if (law.heat) law.temperature = 2 * heated++;
         law.sliding_at_rest = sliding_factor(law.friction, 0);
         if (law.source == LoadSource::waveform) m.depends_on_time = true;
@@ -202,7 +212,9 @@ void build_sizes(ModelData& m) {
     m.states = m.masses + m.twists;
     m.states_padded = padded(m.states);
     m.torques = m.pairs + 2 * m.meshes;
-    m.contact_bytes = m.pairs + m.meshes;
+    m.first_flank = m.pairs + m.meshes;
+    m.plain_shafts = static_cast<int>(m.description.shafts.size());
+    m.contact_bytes = m.first_flank + m.twists - m.plain_shafts;
     m.auxiliary = static_cast<int>(m.description.tyres.size() + 2 * m.description.engines.size());
     for (double inertia : s.inertia) m.root_inertia.push_back(std::sqrt(inertia));
     for (const FrictionPair& pair : s.pairs) {
@@ -211,7 +223,8 @@ void build_sizes(ModelData& m) {
         m.noteworthy_torque = noteworthy;
     }
     for (double inertia : s.inertia) m.energy_factor.push_back(0.5 * inertia);
-    for (const Elastic& shaft : s.shafts) m.energy_factor.push_back(0.5 * shaft.stiffness);
+    for (const Elastic& shaft : s.shafts)
+        m.energy_factor.push_back(shaft.gap > 0 ? 0 : 0.5 * shaft.stiffness);
     for (int j = 0; j < m.masses; ++j) {
         if (m.description.masses[static_cast<std::size_t>(j)].motion == Motion::translating) m.translating.push_back(j);
     }
@@ -278,18 +291,43 @@ void build_sizes(ModelData& m) {
     for (int mass : m.road_mass) m.road_force.push_back(force_on(mass));
     for (int mass : m.plough_mass) m.plough_force.push_back(force_on(mass));
     for (int mass : m.translating) m.translating_force.push_back(force_on(mass));
+    m.first_flank_force = static_cast<int>(m.force_columns.size());
+    for (int e = m.plain_shafts; e < m.twists; ++e) {
+        const Elastic& shaft = s.shafts[static_cast<std::size_t>(e)];
+        m.backlashes.push_back({e, m.first_flank + e - m.plain_shafts,
+                                static_cast<int>(m.force_columns.size()), shaft.stiffness, shaft.damping,
+                                0.5 * shaft.gap});
+        m.force_columns.push_back(shaft.links);
+    }
     m.forces = static_cast<int>(m.force_columns.size());
     for (const auto& links : m.force_columns) m.force_on.push_back(branchless(links));
     m.columns = m.states + m.forces;
-    m.law_rows = whole_panels(m.forces);
+    m.law_rows = whole_panels(m.forces + m.meshes);
     m.power_rows = m.law_rows + whole_panels(m.meshes + m.twists + static_cast<int>(s.dampers.size()));
     m.seen = m.power_rows + m.states;
     for (const auto* elastics : {&s.shafts, &s.dampers}) {
-        for (const Elastic& elastic : *elastics) m.swing_damping.push_back(elastic.damping);
+        for (const Elastic& elastic : *elastics)
+            m.swing_damping.push_back(elastic.gap > 0 ? 0 : elastic.damping);
     }
     for (const PairLaw& law : m.pair_laws) {
         m.static_factor.push_back(law.friction.static_factor);
         m.sliding_at_rest.push_back(law.sliding_at_rest);
+    }
+}
+
+// A contact of flanks can be as short as half a period of the lightest motion they allow. The parts of a step have to
+// see it, and its events have to have room.
+void bound_step(ModelData& m) {
+    m.maximum_events = m.description.maximum_events;
+    m.maximum_parts = m.description.maximum_parts;
+    for (const BacklashLaw& law : m.backlashes) {
+        double mobility = 0;
+        for (const Link& link : m.structure.shafts[static_cast<std::size_t>(law.shaft)].links)
+            mobility += link.factor * link.factor / m.structure.inertia[static_cast<std::size_t>(link.mass)];
+        const double turn = std::sqrt(law.stiffness * mobility) * m.options.step_size;  // ωh
+        m.maximum_events += 2 * static_cast<int>(std::ceil(std::min(turn, 1e4) / 3)) + 2;
+        while (m.maximum_parts > 1 && m.maximum_parts < turn && m.maximum_parts < 1 << 14)
+            m.maximum_parts *= 2;
     }
 }
 
@@ -339,7 +377,7 @@ void build_outputs(ModelData& m) {
         at.mass.push_back(add("mass." + mass.name + ".speed",
                               mass.motion == Motion::rotating ? Unit::radian_per_second : Unit::metre_per_second, "speed"));
     }
-    for (const Elastic& shaft : s.shafts) {
+    for (const Shaft& shaft : d.shafts) {
         at.shaft.push_back(add("shaft." + shaft.name + ".torque", Unit::newton_metre, "torque on the first link"));
         add("shaft." + shaft.name + ".twist", Unit::radian, "twist, positive where the first link is ahead");
     }
@@ -360,6 +398,20 @@ void build_outputs(ModelData& m) {
         add(prefix + "heat", Unit::joule, "friction heat since start");
         if (m.pair_laws[k].hydraulic) at.pressure[k] = add(prefix + "pressure", Unit::pascal, "chamber pressure");
         if (m.pair_laws[k].heat) at.temperature[k] = add(prefix + "temperature", Unit::celsius, "facing surface");
+    }
+    for (const Freewheel& f : d.freewheels) {
+        const std::string prefix = "freewheel." + f.name + ".";
+        at.freewheel.push_back(add(prefix + "torque", Unit::newton_metre, "torque on the first link"));
+        add(prefix + "slip", Unit::radian_per_second, "slip speed, first link minus second");
+        add(prefix + "state", Unit::one, "0 locked, 1 overloaded, 2 overrunning");
+        add(prefix + "heat_power", Unit::watt, "power of drag or overload");
+        add(prefix + "heat", Unit::joule, "heat of drag and overload since start");
+    }
+    for (const Backlash& b : d.backlashes) {
+        const std::string prefix = "backlash." + b.name + ".";
+        at.backlash.push_back(add(prefix + "torque", Unit::newton_metre, "torque on the first link"));
+        add(prefix + "twist", Unit::radian, "twist, 0 in the middle of the play");
+        add(prefix + "state", Unit::one, "0 open, +1 or -1 the flank that is closed");
     }
     for (const Mesh& mesh : s.meshes) {
         const std::string prefix = (mesh.planetary ? "row." : "gear.") + mesh.name + ".";
@@ -432,11 +484,13 @@ Model Model::build(const Description& description, const BuildOptions& options) 
     m.structure = build_structure(m.description);
     detail::build_laws(m);
     detail::build_sizes(m);
+    detail::bound_step(m);
     detail::choose_engine(m);
     detail::build_layout(m);
     detail::build_outputs(m);
     for (const FrictionPair& pair : m.structure.pairs) m.device_names.push_back(pair.name);
     for (const Mesh& mesh : m.structure.meshes) m.device_names.push_back(mesh.name);
+    for (const Backlash& backlash : m.description.backlashes) m.device_names.push_back(backlash.name);
     for (const Engine& engine : m.description.engines) m.device_names.push_back(engine.name);
     return Model(std::move(data));
 }

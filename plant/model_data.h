@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "plant/kernels.h"
+#include "plant/laws/backlash.h"
+#include "plant/laws/freewheel.h"
 #include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/lag.h"
@@ -20,7 +22,7 @@
 namespace shiftrig::plant::detail {
 
 // What presses a friction pair together, and where that comes from.
-enum class LoadSource { constant, waveform, input, release, apply, hydraulic, rolling, resistance, engine };
+enum class LoadSource { constant, waveform, input, release, apply, hydraulic, rolling, resistance, engine, rated };
 
 struct PairLaw {
     LoadSource source{};
@@ -35,6 +37,7 @@ struct PairLaw {
     int delay_slots = 0;       // of a hydraulic actuator
     int command = -1, stuck = -1, valve_stuck = -1, leak = -1;  // inputs
     int temperature = -1;      // offset in the State block
+    int freewheel = -1;        // index into ModelData::freewheels
     const FacingHeat* heat = nullptr;
     HeatOperator heat_operator;
 };
@@ -67,7 +70,8 @@ struct SensorLaw {
 
 // Outputs in groups: index of the first signal of each device.
 struct OutputLayout {
-    std::vector<int> mass, shaft, pair, mesh, tyre, converter, engine, body, plough, sensor;
+    std::vector<int> mass, shaft, pair, freewheel, backlash, mesh, tyre, converter, engine, body, plough,
+        sensor;
     std::vector<int> pressure, temperature;  // per pair, −1 if it has none
     int oil = -1, energy = -1, certificate = -1;
 };
@@ -78,18 +82,23 @@ struct ModelData {
     Structure structure;
     Kernel kernel;
 
-    // z = [ω; φ]; f = [pairs; bearing friction of meshes; external torques].
+    // z = [ω; φ]; f = [pairs; bearing friction of meshes; external torques; ∓kδ of flanks].
     int masses = 0, twists = 0, pairs = 0, meshes = 0;
     int states = 0, states_padded = 0;
     int forces = 0;                       // m
     int first_external = 0;               // where bearing friction ends in f
+    int first_flank_force = 0;            // where external torques end in f
+    int plain_shafts = 0;                 // without play; those with it follow
     int columns = 0;                      // states + m, at most what an operator multiplies
-    // What a view shows: slips of forces; from `law_rows` on those of meshes, shafts and dampers; from `power_rows` on z.
+    // What a view shows: slips of forces, motions of meshes; from `law_rows` on what losses of meshes, shafts and dampers
+    // act on; from `power_rows` on z.
     // Both are whole panels, so that the first part alone (force laws), or the first two (powers), are products too.
     int law_rows = 0, power_rows = 0, seen = 0;
     int torques = 0;                      // unknowns: pairs, meshes, losses of stuck meshes
     int auxiliary = 0;                    // tyre slips, engine torque and boost
-    int contact_bytes = 0;                // pairs + meshes
+    int contact_bytes = 0;                // pairs, meshes, flanks
+    int first_flank = 0;                  // contact byte: pairs + meshes
+    int maximum_events = 0, maximum_parts = 0;       // of a step, as described or as flanks need
     std::vector<std::array<Link, 2>> force_columns;  // how f_k acts *out of* the masses (SDM sign)
     // Slips and twist rates for the step: the housing is there mass 0 with factor 0, which needs no branch.
     std::vector<std::array<Link, 2>> pair_slip, mesh_motion, mesh_loss, shaft_rate, damper_rate, force_on;
@@ -109,6 +118,8 @@ struct ModelData {
     std::unique_ptr<TreeTopology> tree;   // of the engine for long chains; none: dense modes
 
     std::vector<PairLaw> pair_laws;
+    std::vector<FreewheelLaw> freewheels;
+    std::vector<BacklashLaw> backlashes;
     std::vector<int> hydraulic_pairs, pedal_pairs, waveform_pairs;  // by what actuates them
     std::vector<int> heated_pairs;
     int actuated_pairs = 0;               // pairs before those that are loaded by nature (rolling, resistance, engine)
@@ -123,7 +134,7 @@ struct ModelData {
 
     std::vector<Signal> inputs, outputs;
     std::map<std::string, int, std::less<>> input_index, output_index;
-    std::vector<std::string> device_names;  // friction pairs, meshes, engines
+    std::vector<std::string> device_names;  // friction pairs, meshes, backlashes, engines
     int throttle = -1, brake = -1, grade = -1, draft = -1, oil_temperature = -1;
     OutputLayout output_layout;
     StateLayout layout;

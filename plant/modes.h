@@ -30,7 +30,8 @@ enum Bound : unsigned char {
 
 struct Mode {
     std::uint64_t last_use = 0;      // 0: empty
-    unsigned char* key = nullptr;    // per pair 1 locked; per mesh 0 stuck, 1 x = +1, 2 x = −1
+    unsigned char* key = nullptr;    // per pair 1 locked; per mesh 0 stuck, 1 x = +1, 2 x = −1; per
+                                     // shaft with play 1 closed
     unsigned char* bound = nullptr;  // per pair and mesh: bits of Bound
     int* rows = nullptr;             // active torque row → unknown (pair, mesh, loss of mesh)
     std::array<Link, 3>* row_links = nullptr;  // their kinematic columns
@@ -59,6 +60,11 @@ struct Mode {
     double *step_memory = nullptr, *ledger_memory = nullptr;
     TreeMode* tree = nullptr;        // instead of all matrices, on the engine for long chains
 };
+
+// Does the shaft act in the mode, or are its flanks open?
+inline bool is_shaft_closed(const ModelData& m, const Mode& mode, int shaft) noexcept {
+    return shaft < m.plain_shafts || mode.key[m.first_flank + shaft - m.plain_shafts] != 0;
+}
 
 // Room that a mode and its operators take, in doubles and ints.
 struct ModeSizes {
@@ -124,6 +130,7 @@ struct OperatorsData {
     std::vector<PairCommand> commands;
     std::vector<double> rest_loads;    // per pair: its load where its actuator has arrived at the command [Nm]
     std::vector<SensorFaults> sensor_faults;
+    std::vector<double> source_inputs;  // [Nm]
     std::vector<TyreSoil> soils;
     std::vector<EngineSetting> engine_settings;
     std::vector<double> grade_forces;  // per road [N]

@@ -55,6 +55,7 @@ OperatorsData::OperatorsData(const ModelData& m) {
     commands.resize(static_cast<std::size_t>(m.pairs));
     rest_loads.assign(static_cast<std::size_t>(m.pairs), 0.);
     sensor_faults.resize(m.sensors.size());
+    source_inputs.assign(m.sources.size(), 0.);
     soils.resize(m.tyres.size());
     engine_settings.resize(m.engines.size());
     grade_forces.assign(m.road_mass.size(), 0.);

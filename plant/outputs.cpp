@@ -31,7 +31,7 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
 
     next = std::copy(speeds, speeds + m.masses, next);
     const double* twist = speeds + m.masses;
-    for (std::size_t e = 0; e < m.shaft_rate.size(); ++e, ++twist) {
+    for (std::size_t e = 0; e < static_cast<std::size_t>(m.plain_shafts); ++e, ++twist) {
         const double rate = mode.tree ? slip_fast(m.shaft_rate[e], speeds) : s.swing[e];
         put(m.structure.shafts[e].stiffness * *twist + m.swing_damping[e] * rate, *twist);
     }
@@ -44,6 +44,22 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
         put(force + s.torque[k], slip, s.sliding[k], state_code[w.contact[k]], force * slip, *heat);
         if (law.hydraulic) put(block[law.actuator + chamber_slot] * w.operators.commands[i].scale);
         if (law.heat) put(block[law.temperature]);
+    }
+    for (const FreewheelLaw& law : m.freewheels) {
+        const int k = law.pair;
+        const unsigned char state = w.contact[k];
+        const double slip = slip_fast(m.pair_slip[static_cast<std::size_t>(k)], speeds);
+        const double torque = state == locked ? s.torque[k] : s.f[k];
+        put(torque, slip,
+            state == locked                    ? 0.
+            : slip_sign(state) * law.sense > 0 ? 1.
+                                               : 2.,
+            state == locked ? 0. : torque * slip, block[m.layout.heat + k]);
+    }
+    for (const BacklashLaw& law : m.backlashes) {
+        const double side = flank_side(w.contact[law.device]), angle = speeds[m.masses + law.shaft];
+        const double rate = slip_fast(m.shaft_rate[static_cast<std::size_t>(law.shaft)], speeds);
+        put(side == 0 ? 0. : flank_torque(law, side, angle, rate), angle, side);
     }
     for (int k = 0; k < m.meshes; ++k) {
         const auto i = static_cast<std::size_t>(k);

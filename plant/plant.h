@@ -44,6 +44,7 @@ enum class EventKind : std::uint8_t {
     tie_up, fall_back,                       // torque split not unique; more than K events in a step
     engine_stalls, engine_starts,
     facing_warning, facing_failure,
+    flank_closes, flank_opens,               // shafts with play
 };
 
 // Why a state changed ([Algin] eq. (12), (13)); margin = capacity − |torque| at the event.
@@ -52,7 +53,8 @@ struct Event {
     EventKind kind{};
     std::int16_t device = -1;  // index into model.device_names(), −1: none
     double torque = 0;         // [Nm] on the first link
-    double capacity = 0;       // [Nm] static capacity for lock/break_away; what the loss allows for a stuck mesh
+    // [Nm] static capacity for lock/break_away; what the loss allows for a stuck mesh; +1 or −1, which flank it is
+    double capacity = 0;
     double slip = 0;           // [rad/s]
 };
 

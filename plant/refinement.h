@@ -8,6 +8,6 @@ namespace shiftrig::plant::detail {
 // After advance(): do shafts swing within the part, or do forces that depend on the motion change so fast, that
 // its few samples do not show it? Linear motion is exact at any length; finding the instants at which contacts change
 // is not, nor are forces taken from the stages.
-bool is_coarse(const Work& work) SHIFTRIG_REALTIME;
+bool is_coarse(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

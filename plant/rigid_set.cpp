@@ -26,14 +26,19 @@ Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(const Eigen::MatrixXd& scaled
     return qr;
 }
 
+bool can_be_closed(const FrictionPair& pair) {
+    return pair.kind == PairKind::clutch || pair.kind == PairKind::freewheel;
+}
+
 }  // namespace
 
 RigidSet rigid_set(const Description& d, const Structure& s, const std::vector<std::string>& closed,
                    const RigidOptions& options) {
     for (const std::string& name : closed) {
         const int index = s.pair(name);
-        if (index < 0 || s.pairs[static_cast<std::size_t>(index)].kind != PairKind::clutch) {
-            throw ModelError("model", d.name, "closed", "= \"" + name + "\" is no clutch or brake");
+        if (index < 0 || !can_be_closed(s.pairs[static_cast<std::size_t>(index)])) {
+            throw ModelError("model", d.name, "closed",
+                             "= \"" + name + "\" is no clutch, brake or freewheel");
         }
     }
     RigidSet set;
@@ -46,9 +51,10 @@ RigidSet rigid_set(const Description& d, const Structure& s, const std::vector<s
     }
     for (std::size_t i = 0; i < s.pairs.size(); ++i) {
         const FrictionPair& pair = s.pairs[i];
-        if (pair.kind != PairKind::clutch) continue;
+        if (!can_be_closed(pair)) continue;
         const bool named = std::find(closed.begin(), closed.end(), pair.name) != closed.end();
-        const bool contact = d.clutches[static_cast<std::size_t>(pair.source)].radius > 0;
+        const bool contact =
+            pair.kind == PairKind::clutch && d.clutches[static_cast<std::size_t>(pair.source)].radius > 0;
         if (named || (contact && options.rolling_tyres)) {
             add(pair.name, RigidSet::Kind::pair, i, {pair.links[0], pair.links[1], Link{}});
         }

@@ -11,8 +11,8 @@
 
 namespace shiftrig::plant {
 
-// Gears and planetary rows always belong to it, closed pairs as named. Wheel contacts count as closed and
-// tyres as rolling without slip where `rolling` is asked for; shafts count as untwistable where `stiff` is.
+// Gears and planetary rows always belong to it, closed clutches, brakes and freewheels as named. Wheel contacts count as
+// closed and tyres as rolling without slip where `rolling` is asked for; shafts count as untwistable where `stiff` is.
 struct RigidOptions {
     bool stiff_shafts = true;
     bool rolling_tyres = true;
@@ -30,7 +30,7 @@ struct RigidSet {
     Eigen::MatrixXd columns;  // masses × members, kinematic (A, with u)
 };
 
-// Throws ModelError where `closed` names no clutch or brake.
+// Throws ModelError where `closed` names no clutch, brake or freewheel.
 RigidSet rigid_set(const Description& description, const Structure& structure,
                    const std::vector<std::string>& closed, const RigidOptions& options = {});
 

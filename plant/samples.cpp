@@ -24,6 +24,7 @@ void place_sample(const ModelData& m, Sample& s, double* memory) {
     const auto pairs = static_cast<std::size_t>(m.pairs), auxiliary = static_cast<std::size_t>(m.auxiliary);
     s.slip =
         take(static_cast<std::size_t>(whole_panels(m.seen)));  // what products write begins on cache lines
+    s.motion = s.slip + m.forces;
     s.turning = s.slip + m.law_rows;
     s.swing = s.turning + m.meshes;
     s.z = s.slip + m.power_rows;
@@ -59,6 +60,7 @@ ScratchData::ScratchData(const ModelData& m) {
     const auto bytes = static_cast<std::size_t>(m.contact_bytes);
     for (auto* list : {&before, &trial, &release, &changed, &violations}) list->assign(bytes, 0);
     family.assign(bytes, 0);
+    overcome.assign(static_cast<std::size_t>(m.pairs), 0);
     const auto longest = static_cast<std::size_t>(
         whole_panels(std::max({3 * m.states_padded, padded(m.torques), 3 * m.forces}) + m.states_padded +
                      m.columns + m.torques));

@@ -23,6 +23,7 @@ struct Sample {
     Instant at;
     // What the mode's view shows of the coordinates q, in the order of View: a product fills all or the first of these.
     double* slip = nullptr;     // per force: slip of pairs, of bearings in meshes, −ω of external torques
+    double* motion = nullptr;    // per mesh: ω_first − ω_carrier; not on a tree
     double* turning = nullptr;  // per mesh: what its loss torque acts on (ModelData::mesh_loss)
     double* swing = nullptr;    // twist rate of each shaft, slip of each damper
     double* z = nullptr;        // [ω; φ]
@@ -85,6 +86,7 @@ struct ScratchData {
     int sliding_count = 0, dragging_count = 0;
     std::vector<EngineMode> engine_modes;                                    // at the beginning of the step
     std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
+    std::vector<unsigned char> overcome;  // per pair: broke away in the instant being settled
     std::vector<signed char> family;
     AlignedDoubles vectors;
     double *vector_a = nullptr, *vector_b = nullptr,

@@ -97,6 +97,12 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
                                : mesh.lossy() ? detail::moving(motion, 1)
                                               : static_cast<unsigned char>(detail::moves);
     }
+    for (const BacklashLaw& law : m.backlashes) {
+        const double twist = block[m.layout.twists + law.shaft];
+        const double rate = detail::slip_fast(m.shaft_rate[static_cast<std::size_t>(law.shaft)], speeds);
+        const double side = twist < 0 ? -1 : 1;
+        contact[law.device] = detail::closed_flank(open_margin(law, side, twist, rate) < 0 ? side : 0);
+    }
     double* auxiliary = block + m.layout.auxiliary;
     for (std::size_t t = 0; t < m.tyres.size(); ++t, ++auxiliary) {
         const double rim = speeds[m.tyres[t].wheel] * m.description.tyres[t].radius, v = speeds[m.tyres[t].body];
@@ -128,7 +134,7 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
     energy[0] = energy[1] = 0;
     std::vector<double> z(speeds, speeds + m.masses);
     z.insert(z.end(), block + m.layout.twists, block + m.layout.twists + m.twists);
-    energy[2] = detail::stored_energy(m, z.data());
+    energy[2] = detail::stored_energy(m, z.data(), contact);
 }
 
 }  // namespace
@@ -150,10 +156,9 @@ State::State(const Model& model) {
     }
     const Eigen::VectorXd speeds = compatible_speeds(m, wanted, locked, false, {});
     for (int j = 0; j < m.masses; ++j) block[static_cast<std::size_t>(m.layout.speeds + j)] = speeds(j);
-    for (int e = 0; e < m.twists; ++e) {
-        block[static_cast<std::size_t>(m.layout.twists + e)] =
-            m.description.shafts[static_cast<std::size_t>(e)].initial_twist;
-    }
+    double* twist = block.data() + m.layout.twists;
+    for (const Shaft& shaft : m.description.shafts) *twist++ = shaft.initial_twist;
+    for (const Backlash& backlash : m.description.backlashes) *twist++ = backlash.initial_twist;
     initialise(m, block.data(), Inputs(model).value, locked);
 }
 
@@ -180,7 +185,8 @@ void start(const Model& model, State& state, const Start& start, const Inputs& i
     std::vector<int> locked;
     for (const std::string& name : start.locked) {
         const int pair = m.structure.pair(name);
-        if (pair < 0) throw ModelError("start", name, "locked", "is no clutch or brake of the model");
+        if (pair < 0)
+            throw ModelError("start", name, "locked", "is no clutch, brake or freewheel of the model");
         locked.push_back(pair);
     }
     std::vector<std::pair<int, double>> pinned;
@@ -216,7 +222,8 @@ void begin_account(const Model& model, State& state) noexcept {
     std::fill(block + m.layout.heat, block + m.layout.temperatures, 0.);
     double* energy = block + m.layout.energy;
     energy[0] = energy[1] = 0;
-    energy[2] = detail::stored_energy(m, block + m.layout.speeds);
+    energy[2] = detail::stored_energy(m, block + m.layout.speeds,
+                                      reinterpret_cast<const unsigned char*>(block + m.layout.contact));
 }
 
 }  // namespace shiftrig::plant

@@ -63,7 +63,7 @@ struct StaticsResult {
 };
 
 // Throws ModelError where names are wrong, the closed set lets nothing turn, the input torque finds no way to the
-// output, or a speed that a lossy mesh needs does not follow from the given ones.
+// output, a closed freewheel would have to pull or to carry more than it is rated for, or a speed that a lossy mesh needs does not follow from the given ones.
 StaticsResult solve_statics(const Description& description, const StaticsProblem& problem);
 
 }  // namespace shiftrig::plant

@@ -71,9 +71,10 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
                 double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 4;
     // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
-    // beyond.
-    const bool by_itself = crossing.change != Change::state;
-    const double close_enough = by_itself ? 1e-2 : 1e-5, beyond = by_itself ? 3e-3 : 0;
+    // beyond. So too with a freewheel that lets go at no torque: this side of it, it would only lock again.
+    const bool by_itself = acts_by_itself(crossing.change), overrun = crossing.change == Change::overrun;
+    const double close_enough = by_itself ? 1e-2 : overrun ? 1e-3 : 1e-5;
+    const double beyond = by_itself ? 3e-3 : overrun ? 3e-4 : 0;
     double low = done, high = until;
     const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
     double at_low = left(w.scratch.begin), at_high = left(w.scratch.end);
@@ -89,6 +90,36 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
         const double share = at_low > 0 ? at_low / (at_low - at_high) : 0.5;
         reached = low + std::clamp(share + beyond, 0.01, 0.99) * (high - low);
     }
+}
+
+// The same for a flank, whose new state only holds behind the crossing: as near behind it as rounding lets nobody mind.
+// Regula falsi towards a margin just below 0, an end that stays twice counted half (Illinois).
+double approach_flank(Work& w, const Mode& mode, const Crossing& crossing, double done,
+                      double until) SHIFTRIG_REALTIME {
+    constexpr int most_steps = 12;
+    constexpr double close_enough = 1e-5, beyond = 3e-6;  // of the margins at both ends
+    double low = done, high = until;
+    const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
+    double at_low = left(w.scratch.begin), at_high = left(w.scratch.end);
+    const double size = std::fabs(at_low) + std::fabs(at_high);
+    at_low += beyond * size;
+    at_high += beyond * size;
+    double reached = done + std::min(crossing.theta + beyond, 1.) * (until - done);
+    int side = 0;
+    for (int steps = 1; steps < most_steps; ++steps) {
+        integrate(w, mode, reached);
+        const double rest = left(w.scratch.end);
+        if (rest <= 0 && rest >= -close_enough * size) return reached;
+        const bool before = rest > 0;
+        (before ? low : high) = reached;
+        (before ? at_low : at_high) = rest + beyond * size;
+        if (side == (before ? 1 : -1)) (before ? at_high : at_low) *= 0.5;
+        side = before ? 1 : -1;
+        const double share = at_low > 0 && at_high < 0 ? at_low / (at_low - at_high) : 0.5;
+        reached = low + std::clamp(share, 1e-6, 1 - 1e-6) * (high - low);
+    }
+    integrate(w, mode, high);
+    return high;
 }
 
 }  // namespace
@@ -109,27 +140,39 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     Mode* mode = &begin_mode(w);
 
     double length = 1;  // of a part, at most
-    const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.description.maximum_parts : 1);
+    int leans = m.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
+    int dips = m.maximum_events;   // margins looked at where they are least
+    const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.maximum_parts : 1);
     for (double done = 0; done < 1;) {
         // Advance over what is left, up to the next jump of a law; in halves where that is too much at once.
         const double split = next_split(w, done);
         double until = part_end(done, split, length);
         integrate(w, *mode, until);
-        while (length > longest_whole && is_coarse(w)) {
+        while (length > longest_whole && (is_coarse(w, *mode) || hides_contact(w))) {
             length *= 0.5;
             until = part_end(done, split, length);
             integrate(w, *mode, until);
+        }
+        if (localise && dips > 0) {
+            const double theta = first_dip(w, *mode);
+            if (theta < 1) {
+                --dips;
+                until = done + theta * (until - done);
+                integrate(w, *mode, until);
+            }
         }
 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
         Crossing first = first_crossing(w, *mode, s.begin, s.end);
         const bool inside =
-            first.device >= 0 && localise && outputs.certificate.events < m.description.maximum_events;
+            first.device >= 0 && localise && outputs.certificate.events * length < m.maximum_events;
         double reached = until;
-        if (inside && first.theta * (until - done) < instant) {
+        // What a mesh does by itself it does only beyond its limit: there is always a little way to go.
+        if (inside && !acts_by_itself(first.change) && first.theta * (until - done) < instant) {
             reached = done;
         } else if (inside && first.theta < 1 - instant) {
-            reached = approach(w, *mode, first, done, until);
+            reached = first.change == Change::flank ? approach_flank(w, *mode, first, done, until)
+                                                    : approach(w, *mode, first, done, until);
         }
 
         // Energy ledger of the accepted part.
@@ -143,10 +186,11 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
         // The new state acts from here on; where events are used up, or by choice, from the next step on.
         if (inside) {
-            if (first.change == Change::state) change_state(w, first.device, s.begin);
-            ++outputs.certificate.events;
-        } else if (first.device >= 0 && first.change == Change::state) {
-            change_all(w, *mode, s.begin);
+            const bool moves = acts_by_itself(first.change) ? first.change != Change::limit
+                                                            : change_state(w, first.device, s.begin);
+            if (moves || --leans < 0) ++outputs.certificate.events;
+        } else if (first.device >= 0 && first.change != Change::turn && first.change != Change::limit) {
+            if (!acts_by_itself(first.change)) change_all(w, *mode, s.begin);
             outputs.certificate.fall_backs += localise;
         }
         if (done < 1 || first.device >= 0) {

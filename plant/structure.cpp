@@ -111,6 +111,14 @@ Structure build_structure(const Description& d) {
         s.pairs.push_back({c.name, PairKind::clutch, static_cast<int>(i), {link(c.a, 1), link(c.b, b)},
                            nominal_capacity(c)});
     }
+    for (std::size_t i = 0; i < d.freewheels.size(); ++i) {
+        const Freewheel& f = d.freewheels[i];
+        s.pairs.push_back({f.name,
+                           PairKind::freewheel,
+                           static_cast<int>(i),
+                           {link(f.a, 1), link(f.b, -1)},
+                           f.rated_torque});
+    }
     for (std::size_t i = 0; i < d.tyres.size(); ++i) {
         const BrixiusTyre& t = d.tyres[i];
         if (t.rolling_coefficient <= 0) continue;
@@ -146,11 +154,17 @@ Structure build_structure(const Description& d) {
 
     for (std::size_t i = 0; i < d.shafts.size(); ++i) {
         const Shaft& e = d.shafts[i];
-        s.shafts.push_back({e.name, {link(e.a, 1), link(e.b, -1)}, e.stiffness, e.damping, static_cast<int>(i)});
+        s.shafts.push_back(
+            {e.name, {link(e.a, 1), link(e.b, -1)}, e.stiffness, e.damping, static_cast<int>(i), 0});
+    }
+    for (std::size_t i = 0; i < d.backlashes.size(); ++i) {
+        const Backlash& e = d.backlashes[i];
+        s.shafts.push_back(
+            {e.name, {link(e.a, 1), link(e.b, -1)}, e.stiffness, e.damping, static_cast<int>(i), e.gap});
     }
     for (std::size_t i = 0; i < d.dampers.size(); ++i) {
         const Damper& k = d.dampers[i];
-        s.dampers.push_back({k.name, {link(k.a, 1), link(k.b, -1)}, 0, k.damping, static_cast<int>(i)});
+        s.dampers.push_back({k.name, {link(k.a, 1), link(k.b, -1)}, 0, k.damping, static_cast<int>(i), 0});
     }
     return s;
 }

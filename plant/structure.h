@@ -8,6 +8,7 @@
 //
 //   | device                        | column of A                                   |
 //   | clutch, shaft, damper a–b     | a: 1, b: −1                                   |
+//   | freewheel a–b                 | a: 1, b: −1                                   |
 //   | brake, damper on a            | a: 1                                          |
 //   | wheel a on a road mass b      | a: 1, b: −1/r                                 |
 //   | gear, u = ω_a/ω_b             | a: 1, b: −u                                   |
@@ -38,6 +39,7 @@ struct Link {
 // themselves, because what resists motion must also be able to hold a body at rest:
 enum class PairKind {
     clutch,           // clutch, brake, Coulomb wheel contact: description.clutches[source]
+    freewheel,        // description.freewheels[source]
     rolling,          // rolling moment on a tyre's wheel: description.tyres[source]
     body_resistance,  // motion resistance and draft on a translating mass: description.masses[source]
     engine_friction,  // of a stalled engine on its mass: description.engines[source]
@@ -76,12 +78,13 @@ struct Mesh {
     std::array<Link, 2> motion() const noexcept { return {Link{first, 1}, Link{carrier, carrier < 0 ? 0. : -1.}}; }
 };
 
-// A shaft or a damper: a known torque stiffness·twist + damping·(ω_a − ω_b).
+// A shaft or a damper: a known torque stiffness·twist + damping·(ω_a − ω_b). With a gap, only beyond it.
 struct Elastic {
     std::string name;
     std::array<Link, 2> links;
     double stiffness = 0, damping = 0;
-    int source = -1;  // index into description.shafts or .dampers
+    int source = -1;  // index into description.shafts, .backlashes or .dampers
+    double gap = 0;   // the whole play [rad]; 0: none
 };
 
 struct Structure {
@@ -89,7 +92,7 @@ struct Structure {
     std::vector<double> inertia;  // [kg m²] or [kg]
     std::vector<FrictionPair> pairs;
     std::vector<Mesh> meshes;     // gears, then planetary rows, in description order
-    std::vector<Elastic> shafts;
+    std::vector<Elastic> shafts;  // then backlashes
     std::vector<Elastic> dampers;
 
     int masses() const noexcept { return static_cast<int>(inertia.size()); }

@@ -41,7 +41,7 @@ double slip_scale(const Work& w, int device, const double* speeds) {
 double torque_scale(const Work& w, const Sample& s) {
     double scale = 0;
     for (int k = 0; k < w.model.torques; ++k) scale = std::max(scale, std::fabs(s.torque[k]));
-    for (int k = 0; k < w.model.forces; ++k) scale = std::max(scale, std::fabs(s.f[k]));
+    for (int k = 0; k < w.model.first_flank_force; ++k) scale = std::max(scale, std::fabs(s.f[k]));
     return scale;
 }
 
@@ -56,7 +56,7 @@ double loss_kink(const Work& w, int mesh, double sign) { return sign * w.model.l
 bool rest_bound_meshes(const Work& w, const Mode& mode, unsigned char* contact) {
     if (!mode.tree) return false;
     bool changed = false;
-    for (int k = w.model.pairs; k < w.model.contact_bytes; ++k) {
+    for (int k = w.model.pairs; k < w.model.first_flank; ++k) {
         if (contact[k] == stuck || !mode.bound[k] || !mesh_of(w, k - w.model.pairs).lossy()) continue;
         contact[k] = stuck;
         changed = true;
@@ -135,7 +135,7 @@ bool engage_and_release(Work& w, Sample& s) {
 bool is_overloaded(const Work& w, int pair, const Sample& s) {
     if (pair < 0) return false;
     const double torque = std::fabs(s.torque[pair]);
-    return torque > overload * s.holding[pair] && torque > 1e-11 * torque_scale(w, s);
+    return torque > overload * static_limit(w, pair, s) && torque > 1e-11 * torque_scale(w, s);
 }
 
 // The locked pair that uses most of its static capacity.
@@ -143,23 +143,37 @@ struct Use {
     int pair = -1;
     double share = 0;  // torque over capacity
 };
-Use most_used(const Work& w, const Sample& s) {
+Use most_used(const Work& w, const unsigned char* contact, const Sample& s) {
     Use worst;
     for (int k = 0; k < w.model.pairs; ++k) {
-        if (w.contact[k] != locked) continue;
-        const double use = std::fabs(s.torque[k]) / s.holding[k];
+        if (contact[k] != locked) continue;
+        const double use = std::fabs(s.torque[k]) / static_limit(w, k, s);
         if (use > worst.share && (use <= overload || is_overloaded(w, k, s))) worst = {k, use};
     }
     return worst;
 }
 
+// The law of a pair that is a freewheel, else none.
+const FreewheelLaw* freewheel_of(const Work& w, int pair) {
+    const int index = w.model.pair_laws[static_cast<std::size_t>(pair)].freewheel;
+    return index < 0 ? nullptr : &w.model.freewheels[static_cast<std::size_t>(index)];
+}
+
+// The sense in which a locked pair begins to slip: that of its torque. A freewheel that lets go does so at next to none.
+double opening_sense(const Work& w, int pair, double torque) {
+    const FreewheelLaw* law = freewheel_of(w, pair);
+    if (!law) return torque;
+    return is_next_to_overrun(*law, torque) ? -law->sense : law->sense;
+}
+
 // Meshes that leaned on their losses begin anew: which way they go now, release_drive() finds out.
 void open(Work& w, const Mode& mode, int pair, Sample& s) {
-    for (int k = w.model.pairs; k < w.model.contact_bytes; ++k) {
+    for (int k = w.model.pairs; k < w.model.first_flank; ++k) {
         if (mode.bound[k] && mesh_of(w, k - w.model.pairs).lossy()) w.contact[k] = stuck;
     }
-    log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], s.holding[pair], 0);
-    w.contact[pair] = slipping(s.torque[pair]);
+    log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], static_limit(w, pair, s), 0);
+    w.contact[pair] = slipping(opening_sense(w, pair, s.torque[pair]));
+    w.scratch.overcome[static_cast<std::size_t>(pair)] = !mode.tree;
     contact_forces(w, w.contact, s);
 }
 
@@ -171,7 +185,7 @@ bool lean_on_losses(Work& w, const Mode& mode, double use, Sample& s) {
     if (mode.tree) return false;
     unsigned char* trial = w.scratch.trial.data();
     bool found = false, tried = false;
-    for (int k = m.pairs; k < m.contact_bytes; ++k) {
+    for (int k = m.pairs; k < m.first_flank; ++k) {
         if (!mesh_of(w, k - m.pairs).lossy() || (w.contact[k] != stuck && !mode.bound[k])) continue;
         if (!tried) std::copy(s.torque, s.torque + m.torques, w.scratch.torque_copy.data());
         tried = true;
@@ -181,7 +195,7 @@ bool lean_on_losses(Work& w, const Mode& mode, double use, Sample& s) {
             trial[k] = moving(direction, w.scratch.torque_copy[static_cast<std::size_t>(k)] * direction < 0 ? -1 : 1);
             contact_forces(w, trial, s);
             const Mode& leaning = find_directions(w, trial, s);
-            const double relieved = most_used(w, s).share;
+            const double relieved = most_used(w, w.contact, s).share;
             if (!leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
             use = relieved;
             found = true;
@@ -244,7 +258,7 @@ double find_family(Work& w, const Mode& mode, int leader, signed char* part) {
     const ModelData& m = w.model;
     signed char* relation = mode.relations + leader * m.contact_bytes;
     if (mode.family_mobility[leader] < 0) relate(w, mode, leader, relation);
-    for (int k = 0; k < m.contact_bytes; ++k) {
+    for (int k = 0; k < m.first_flank; ++k) {
         const bool still = k < m.pairs ? slips(w.contact[k]) : w.contact[k] == stuck || mode.bound[k];
         part[k] = still ? relation[k] : static_cast<signed char>(0);
     }
@@ -270,11 +284,13 @@ double release_drive(Work& w, const Mode& mode, int leader, Sample& s) {
     const double threshold = 1e-10 * torque_scale(w, s) * mobility * mobility;
     unsigned char* trial = scratch.trial.data();
     std::copy(s.torque, s.torque + m.torques, scratch.torque_copy.data());
-    // To set it moving, the load must overcome what its pairs can hold, not what they pass on sliding.
+    // To set it moving, the load must overcome what its pairs can hold, not what they pass on sliding; but a pair that
+    // breaks away in this very instant has been overcome.
     double* sliding = scratch.vector_a;
     std::copy(s.sliding, s.sliding + m.pairs, sliding);
     for (int k = 0; k < m.pairs; ++k) {
-        if (part[k] != 0) s.sliding[k] = std::max(s.sliding[k], s.holding[k]);
+        if (part[k] != 0 && !scratch.overcome[static_cast<std::size_t>(k)])
+            s.sliding[k] = std::max(s.sliding[k], s.holding[k]);
     }
     const auto set = [&](int k, double sign) {
         const int x = scratch.torque_copy[static_cast<std::size_t>(k)] * sign < 0 ? -1 : 1;
@@ -282,7 +298,7 @@ double release_drive(Work& w, const Mode& mode, int leader, Sample& s) {
     };
     const auto begin_trial = [&](double direction) {
         std::copy(w.contact, w.contact + m.contact_bytes, trial);
-        for (int k = 0; k < m.contact_bytes; ++k) {
+        for (int k = 0; k < m.first_flank; ++k) {
             if (part[k] != 0) set(k, direction * part[k]);
         }
     };
@@ -333,6 +349,54 @@ LossAtRest loss_at_rest(const Work& w, int k, const Sample& s) {
     return {needed, allowed};
 }
 
+// What is left of the loss that a stuck mesh can take.
+double loss_left(const Work& w, int mesh, const Sample& s) {
+    const LossAtRest loss = loss_at_rest(w, mesh, s);
+    return loss.allowed - std::fabs(loss.needed);
+}
+
+// A stuck mesh that nothing sets in motion, but whose loss would have to be more than it can be, stays at its limit, and a
+// pair at rest that had been at its own takes the rest: it locks. The counterpart of lean_on_losses().
+bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) {
+    const ModelData& m = w.model;
+    if (mode.tree) return false;
+    unsigned char* trial = w.scratch.trial.data();
+    double size = 0;
+    for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
+        const int mesh = mode.rows[r] - m.pairs - m.meshes, device = m.pairs + mesh;
+        const double left = loss_left(w, mesh, s);
+        if (left >= 0) continue;
+        if (size == 0) size = torque_scale(w, s);
+        if (left >= -1e-9 * size) continue;
+        const double direction = s.torque[device + m.meshes] < 0 ? -1 : 1;
+        const int x = s.torque[device] * direction < 0 ? -1 : 1;
+        double least = overload;
+        int taker = -1;
+        for (int k = 0; k < m.pairs; ++k) {
+            if (!slips(w.contact[k]) || !mode.bound[k] || w.scratch.overcome[static_cast<std::size_t>(k)]) continue;
+            if (std::fabs(device_slip(w, k, s.z)) > at_rest) continue;
+            std::copy(w.contact, w.contact + m.contact_bytes, trial);
+            trial[device] = moving(direction, x);
+            trial[k] = locked;
+            contact_forces(w, trial, s);
+            const Mode& shared = find_directions(w, trial, s);
+            const double use = most_used(w, trial, s).share;
+            if (!shared.bound[device] || use >= least) continue;
+            least = use;
+            taker = k;
+            std::copy(trial, trial + m.contact_bytes, w.scratch.release.data());
+        }
+        if (taker >= 0) {
+            std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);
+            log_event(w, EventKind::lock, taker, s.at.time, 0, s.holding[taker], 0);
+        }
+        contact_forces(w, w.contact, s);
+        if (taker >= 0) return true;
+        internal_torques(w, mode, s);
+    }
+    return false;
+}
+
 // Closings are told with the torques that they lead to.
 void tell_closings(Work& w, const Sample& s) {
     const int count = std::min(w.outputs.event_count, Outputs::event_capacity);
@@ -351,7 +415,7 @@ void tell_closings(Work& w, const Sample& s) {
 bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
     if (release_drive(w, mode, leader, s) <= 0) return false;
     const ModelData& m = w.model;
-    for (int k = m.pairs; k < m.contact_bytes; ++k) {
+    for (int k = m.pairs; k < m.first_flank; ++k) {
         if (w.contact[k] != stuck || w.scratch.release[static_cast<std::size_t>(k)] == stuck) continue;
         const LossAtRest loss = loss_at_rest(w, k - m.pairs, s);
         log_event(w, EventKind::mesh_releases, k, s.at.time, loss.needed, loss.allowed, 0);
@@ -421,9 +485,71 @@ void close(Work& w, int device, Sample& s) {
     for (int k = 0; k < m.pairs; ++k) {
         if (slips(w.contact[k]) && mode.bound[k] && !was_bound[k]) set(k);
     }
-    for (int k = m.pairs; k < m.contact_bytes; ++k) {
+    for (int k = m.pairs; k < m.first_flank; ++k) {
         if (w.contact[k] != stuck && mode.bound[k] && !was_bound[k] && mesh_of(w, k - m.pairs).lossy()) set(k);
     }
+}
+
+// ---- flanks -----------------------------------------------------------------------------------------
+
+struct Twist {
+    double angle, rate;
+};
+Twist twist_of(const ModelData& m, const BacklashLaw& law, const Sample& s) {
+    return {s.z[m.masses + law.shaft], slip_fast(m.shaft_rate[static_cast<std::size_t>(law.shaft)], s.z)};
+}
+
+// In torque: what a closed flank still presses with, how far the nearer of two open ones is from pressing.
+double flank_margin(const Work& w, const BacklashLaw& law, double twist, double rate) {
+    const double side = flank_side(w.contact[law.device]);
+    if (side != 0) return closed_margin(law, side, twist, rate);
+    return std::min(open_margin(law, 1, twist, rate), open_margin(law, -1, twist, rate));
+}
+
+double flank_margin(const Work& w, const BacklashLaw& law, const Sample& s) {
+    const auto [twist, rate] = twist_of(w.model, law, s);
+    return flank_margin(w, law, twist, rate);
+}
+
+// The same half way through a part, of which only coordinates and slips are there.
+double flank_margin_half_way(const Work& w, const BacklashLaw& law) {
+    const Sample& half = w.scratch.half;
+    const double twist = half.f[law.shaft - w.model.twists], rate = half.slip[law.force];
+    return flank_margin(w, law, twist, rate);
+}
+
+// Not by rounding: a tooth at rest that touches without load stays as it is.
+bool is_flank_violated(const BacklashLaw& law, double margin) {
+    return margin < -1e-12 * (law.stiffness * law.half_gap + law.damping);
+}
+bool is_flank_violated(const Work& w, const BacklashLaw& law, const Sample& s) {
+    return is_flank_violated(law, flank_margin(w, law, s));
+}
+
+bool flanks_hold(const Work& w, const Sample& end) {
+    for (const BacklashLaw& law : w.model.backlashes) {
+        if (is_flank_violated(w, law, end)) return false;
+    }
+    return true;
+}
+
+// Strain of a flank that opens is lost in its damper; what it has where it closes, by as much as that is beside the
+// very instant, is booked with its sign.
+void change_flank(Work& w, const BacklashLaw& law, Sample& s) {
+    const auto [twist, rate] = twist_of(w.model, law, s);
+    unsigned char& state = w.contact[law.device];
+    const double side = flank_side(state);
+    const double next = side != 0                                                              ? 0
+                        : open_margin(law, 1, twist, rate) < open_margin(law, -1, twist, rate) ? 1
+                                                                                               : -1;
+    state = closed_flank(next);
+    w.scratch.dissipated += flank_energy(law, side, twist) - flank_energy(law, next, twist);
+    log_event(w, side == 0 ? EventKind::flank_closes : EventKind::flank_opens, law.device, s.at.time,
+              flank_torque(law, side + next, twist, rate), side + next, rate);
+}
+
+const BacklashLaw& backlash_of(const Work& w, int device) {
+    return w.model.backlashes[static_cast<std::size_t>(device - w.model.first_flank)];
 }
 
 }  // namespace
@@ -496,12 +622,12 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
     if (longest == 0) return mode;
     Mode& turned = find_mode(m, w.operators, w.contact, w.scratch);
     join(w, turned, change);
-    const double before = stored_energy(m, end.z);
+    const double before = stored_energy(m, end.z, w.contact);
     for (int j = 0; j < m.masses; ++j) end.z[j] += change[j];
     for (int e = 0; e < m.twists; ++e) {
         end.z[m.masses + e] += longest / 3 * slip_of(m.structure.shafts[static_cast<std::size_t>(e)].links, change);
     }
-    w.scratch.dissipated += before - stored_energy(m, end.z);
+    w.scratch.dissipated += before - stored_energy(m, end.z, w.contact);
     look(m, turned, end);
     evaluate_forces(w, w.contact, end);
     internal_torques(w, turned, end);
@@ -518,14 +644,15 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
     for (int passes = 0;; ++passes, complete = false) {
         Mode& mode = find_directions(w, w.contact, s, complete);
         if (passes <= most_passes) {
-            if (release_stuck_meshes(w, mode, s)) continue;
-            const Use worst = most_used(w, s);
+            if (release_stuck_meshes(w, mode, s) || leave_to_pairs(w, mode, s)) continue;
+            const Use worst = most_used(w, w.contact, s);
             if (is_overloaded(w, worst.pair, s)) {
                 if (!lean_on_losses(w, mode, worst.share, s)) open(w, mode, worst.pair, s);
                 continue;
             }
         }
         if (w.scratch.told_events < w.outputs.event_count) tell_closings(w, s);
+        std::fill(w.scratch.overcome.begin(), w.scratch.overcome.end(), static_cast<unsigned char>(0));
         return mode;
     }
 }
@@ -533,9 +660,14 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
 namespace {
 
 double margin(const Work& w, int device, const Sample& s) {
+    if (device >= w.model.first_flank) return flank_margin(w, backlash_of(w, device), s);
     const unsigned char state = w.contact[device];
     if (device >= w.model.pairs) return motion_sign(state) * device_slip(w, device, s.z);
-    if (state == locked) return s.holding[device] - std::fabs(s.torque[device]);
+    if (state == locked) {
+        const FreewheelLaw* law = freewheel_of(w, device);
+        return law ? freewheel_margin(*law, s.torque[device])
+                   : s.holding[device] - std::fabs(s.torque[device]);
+    }
     return slip_sign(state) * device_slip(w, device, s.z);
 }
 
@@ -549,9 +681,13 @@ double turning_margin(const Work& w, int device, const Sample& s) {
 
 double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Sample& s) SHIFTRIG_REALTIME {
     switch (crossing.change) {
-        case Change::state: return margin(w, crossing.device, s);
+        case Change::state:
+        case Change::overrun:
+        case Change::flank:
+            return margin(w, crossing.device, s);
         case Change::turn: return turning_margin(w, crossing.device, s);
         case Change::release: return -release_drive(w, mode, crossing.device - w.model.pairs, s);
+        case Change::limit: return loss_left(w, crossing.device - w.model.pairs, s);
     }
     return 0;
 }
@@ -573,11 +709,19 @@ bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
     for (const int k : m.lossy_meshes) {
         const unsigned char state = w.contact[m.pairs + k];
         const double sign = motion_sign(state), x = loss_exponent(state);
-        const double slip = slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z);
+        const double slip = mode.tree ? slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z) : end.motion[k];
         moving = std::min(moving, sign * slip);
         driving = std::min(driving, (end.torque[m.pairs + k] - loss_kink(w, k, sign)) * (sign * x));
     }
     return !(moving < 0 || driving < 0);
+}
+
+// What a locked freewheel would have to pass on against its sense, all_hold() does not see.
+bool freewheels_hold(const Work& w, const Sample& end) {
+    for (const FreewheelLaw& law : w.model.freewheels) {
+        if (w.contact[law.pair] == locked && freewheel_margin(law, end.torque[law.pair]) < 0) return false;
+    }
+    return true;
 }
 
 }  // namespace
@@ -590,20 +734,58 @@ static void complete_half(Work& w, const Mode& mode) {
     active_torques(w.model, mode, w.scratch.half);
 }
 
+double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const Sample &begin = w.scratch.begin, &half = w.scratch.half, &end = w.scratch.end;
+    double first = 1;
+    if (mode.tree) return first;
+    // The least of the parabola through three margins; that they are about to vanish is enough to look closer.
+    const auto consider = [&](double g0, double gm, double g1) {
+        const double slope = 4 * gm - 3 * g0 - g1, bend = 2 * (g0 - 2 * gm + g1);
+        if (!(slope < 0 && slope + 2 * bend > 0 && g0 >= 0 && g1 > 0)) return;  // falling at first, rising at last
+        const double theta = -0.5 * slope / bend;
+        if (theta > 0.02 && theta < 0.98 && g0 + 0.5 * slope * theta < 0.1 * std::min(g0, g1)) first = std::min(first, theta);
+    };
+    // What has just been let go begins at zero: it may be driven back at first.
+    const auto begun = [](double slip) { return std::fabs(slip) < at_rest ? 0 : slip; };
+    bool torques_known = false;
+    for (int k = 0; k < m.pairs; ++k) {
+        const unsigned char state = w.contact[k];
+        if (slips(state)) {
+            const double sign = slip_sign(state);
+            consider(begun(sign * begin.slip[k]), sign * half.slip[k], sign * end.slip[k]);
+        } else if (state == locked && std::fabs(end.torque[k]) > 0.8 * end.holding[k] && !freewheel_of(w, k)) {
+            if (!torques_known) complete_half(w, mode);
+            torques_known = true;
+            consider(margin(w, k, begin), margin(w, k, half), margin(w, k, end));
+        }
+    }
+    for (const int k : m.lossy_meshes) {
+        const unsigned char state = w.contact[m.pairs + k];
+        if (state == stuck || mode.bound[m.pairs + k]) continue;
+        const double sign = motion_sign(state);
+        consider(begun(sign * begin.motion[k]), sign * half.motion[k], sign * end.motion[k]);
+    }
+    return first;
+}
+
 Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     w.scratch.turned = false;
     Crossing first;
-    if (all_hold(w, mode, end)) return first;
-    bool rates_known = false, middle_known = false;
-    for (int k = 0; k < m.contact_bytes; ++k) {
+    if (all_hold(w, mode, end) && freewheels_hold(w, end) && flanks_hold(w, end)) return first;
+    bool rates_known = false, middle_known = false, begin_known = false;
+    for (int k = 0; k < m.first_flank; ++k) {
         if (!violated(w, mode, k, end)) continue;
         double theta;
+        Change change = Change::state;
         if (k < m.pairs && w.contact[k] == locked) {
             if (!middle_known) complete_half(w, mode);
             middle_known = true;
             const double g0 = margin(w, k, begin), gm = margin(w, k, w.scratch.half), g1 = margin(w, k, end);
             theta = g0 <= 0 ? 0 : parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
+            const FreewheelLaw* law = freewheel_of(w, k);
+            if (law && is_next_to_overrun(*law, end.torque[k])) change = Change::overrun;
         } else {
             if (!rates_known) sample_rate(w, mode, begin);
             rates_known = true;
@@ -612,20 +794,36 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
             theta = parabola_root(margin(w, k, begin), sign * device_slip(w, k, begin.rate) * length,
                                   margin(w, k, end));
         }
-        if (first.device < 0 || theta < first.theta) first = {k, theta, Change::state};
+        if (first.device < 0 || theta < first.theta) first = {k, theta, change};
+    }
+    for (const BacklashLaw& law : m.backlashes) {
+        if (!is_flank_violated(w, law, end)) continue;
+        const double g0 = flank_margin(w, law, begin), g1 = flank_margin(w, law, end);
+        const double gm = flank_margin_half_way(w, law);
+        const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
+        if (first.device < 0 || theta < first.theta) first = {law.device, theta, Change::flank};
     }
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
         const int leader = mode.rows[r] - m.pairs - m.meshes;
         const double drive = release_drive(w, mode, leader, end);
-        if (drive <= 0) continue;
+        if (drive <= 0) {
+            const double left = loss_left(w, leader, end);
+            if (left >= 0) continue;
+            if (!begin_known) internal_torques(w, mode, begin);
+            begin_known = true;
+            const double before = loss_left(w, leader, begin);
+            const double theta = before / (before - left);
+            if (before > 0 && (first.device < 0 || theta < first.theta)) first = {m.pairs + leader, theta, Change::limit};
+            continue;
+        }
         const double before = std::min(release_drive(w, mode, leader, begin), 0.);
         const double theta = before / (before - drive);
         if (first.device < 0 || theta < first.theta) first = {m.pairs + leader, theta, Change::release};
     }
     w.scratch.turned = false;
     double size = 0;
-    const double small = m.description.maximum_parts == 1 ? small_loss : small_loss_of_parts;
-    for (int k = m.pairs; k < m.contact_bytes; ++k) {
+    const double small = m.maximum_parts == 1 ? small_loss : small_loss_of_parts;
+    for (int k = m.pairs; k < m.first_flank; ++k) {
         if (w.contact[k] == stuck || mode.bound[k] || !mesh_of(w, k - m.pairs).lossy()) continue;
         const double g1 = turning_margin(w, k, end);
         if (g1 >= 0) continue;
@@ -643,19 +841,42 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
     return first;
 }
 
-void change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
-    if (device < w.model.pairs && w.contact[device] == locked) {
+bool hides_contact(const Work& w) SHIFTRIG_REALTIME {
+    for (const BacklashLaw& law : w.model.backlashes) {
+        if (is_flank_violated(law, flank_margin_half_way(w, law)) &&
+            !is_flank_violated(w, law, w.scratch.end))
+            return true;
+    }
+    return false;
+}
+
+bool change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
+    if (device >= w.model.first_flank) {
+        change_flank(w, backlash_of(w, device), s);
+    } else if (device < w.model.pairs && w.contact[device] == locked) {
         const Mode& mode = find_mode(w.model, w.operators, w.contact, w.scratch);
-        if (!lean_on_losses(w, mode, most_used(w, s).share, s)) open(w, mode, device, s);
+        if (lean_on_losses(w, mode, most_used(w, w.contact, s).share, s)) return false;
+        open(w, mode, device, s);
     } else {
         close(w, device, s);
     }
+    return true;
 }
 
 void change_all(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    // An open flank is found deep in the other: its twist begins where it touches, not with strain from nowhere.
+    for (const BacklashLaw& law : w.model.backlashes) {
+        if (!is_flank_violated(w, law, s)) continue;
+        change_flank(w, law, s);
+        const double side = flank_side(w.contact[law.device]);
+        double& twist = s.z[w.model.masses + law.shaft];
+        if (side == 0 || side * twist <= law.half_gap) continue;
+        w.scratch.dissipated += flank_energy(law, side, twist);
+        twist = side * law.half_gap;
+    }
     unsigned char* list = w.scratch.violations.data();
-    for (int k = 0; k < w.model.contact_bytes; ++k) list[k] = violated(w, mode, k, s);
-    for (int k = 0; k < w.model.contact_bytes; ++k) {
+    for (int k = 0; k < w.model.first_flank; ++k) list[k] = violated(w, mode, k, s);
+    for (int k = 0; k < w.model.first_flank; ++k) {
         const bool closed = k < w.model.pairs ? w.contact[k] == locked : w.contact[k] == stuck;
         if (!list[k]) continue;
         if (k < w.model.pairs && closed) {
@@ -665,7 +886,7 @@ void change_all(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         }
     }
     // A join with residual slip may have turned others round.
-    for (int k = 0; k < w.model.contact_bytes; ++k) {
+    for (int k = 0; k < w.model.first_flank; ++k) {
         const double slip = device_slip(w, k, s.z);
         if (std::fabs(slip) <= at_rest) continue;
         if (k < w.model.pairs) {

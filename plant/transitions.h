@@ -15,10 +15,18 @@ enum class Change {
     state,    // a pair opens or closes, a mesh comes to rest
     turn,     // the power through a mesh turns round
     release,  // a stuck mesh goes
+    overrun,  // a freewheel lets go
+    limit,    // a stuck mesh stays, but has to leave to others what is too much for its loss
+    flank,    // a flank closes or opens
 };
 
+// Once the crossing lies behind, settle() does the rest.
+constexpr bool acts_by_itself(Change change) noexcept {
+    return change == Change::turn || change == Change::release || change == Change::limit;
+}
+
 struct Crossing {
-    int device = -1;   // contact byte: pair or pairs + mesh; −1: nobody changes
+    int device = -1;   // contact byte: pair, mesh or flank; −1: nobody changes
     double theta = 1;  // where between begin and end, 0…1
     Change change = Change::state;
 };
@@ -28,12 +36,19 @@ struct Crossing {
 // they swing within the step, reversals of power are looked for as well; elsewhere correct_directions() does.
 Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME;
 
+// Has a flank closed or opened half way that at the end is as it was? The part is too long for it.
+bool hides_contact(const Work& work) SHIFTRIG_REALTIME;
+// Where between begin and end the margin of a device that holds at both is so small that it may have been negative:
+// a slip that comes to zero and goes back, a torque that is too much for an instant. 1: nowhere.
+double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME;
+
 // How far from its change the device is at the sample: slip in the direction of its motion, capacity left, torque
 // beyond the point where both losses of a mesh agree, what a stuck mesh lacks to go. Negative: behind it.
 double crossing_margin(Work& work, const Mode& mode, const Crossing& crossing, Sample& sample) SHIFTRIG_REALTIME;
 
-// Changes the state of one device at the sample, and with it of all that its closing brings to rest.
-void change_state(Work& work, int device, Sample& sample) SHIFTRIG_REALTIME;
+// Changes the state of one device at the sample, and with it of all that its closing brings to rest. False: a mesh at
+// rest takes over what is too much for it, and nothing begins to move.
+bool change_state(Work& work, int device, Sample& sample) SHIFTRIG_REALTIME;
 
 // The article's next-step rule: every device whose state did not hold changes at the end of the step.
 void change_all(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;

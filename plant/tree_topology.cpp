@@ -231,6 +231,10 @@ class Builder {
 }  // namespace
 
 std::unique_ptr<TreeTopology> build_topology(const ModelData& model, std::string& reason) {
+    if (!model.backlashes.empty()) {
+        reason = "backlash \"" + model.description.backlashes.front().name + "\" changes its stiffness";
+        return nullptr;
+    }
     Builder builder(model);
     if (!builder.is_forest(reason)) return nullptr;
     return builder.build();

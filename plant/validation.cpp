@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "plant/connectors.h"
 #include "plant/plant.h"
 
 namespace shiftrig::plant {
@@ -29,7 +30,7 @@ class Check {
     void positive(const char* field, double value) const { rule(field, value, value > 0, "> 0"); }
     void not_negative(const char* field, double value) const { rule(field, value, value >= 0, ">= 0"); }
     void not_zero(const char* field, double value) const { rule(field, value, value != 0, "different from 0"); }
-    void efficiency(const char* field, double value) const {
+    void share(const char* field, double value) const {
         rule(field, value, value > 0 && value <= 1, "in (0, 1]");
     }
     void any(const char* field, double value) const { rule(field, value, true, "finite"); }
@@ -90,13 +91,6 @@ class Joints {
     std::vector<End> links_;
 };
 
-void distinct(std::string_view kind, const std::string& device, const char* field, const std::string& a,
-              const std::string& b) {
-    if (a == b) {
-        throw ModelError(std::string(kind), device, field, "= \"" + b + "\"; both links end on the same mass");
-    }
-}
-
 void check_waveform(const Check& check, const char* field, const Waveform& waveform) {
     for (const Waveform::Piece& piece : waveform.pieces) {
         for (double value : {piece.offset, piece.slope, piece.amplitude, piece.frequency, piece.phase_time}) {
@@ -107,9 +101,26 @@ void check_waveform(const Check& check, const char* field, const Waveform& wavef
     }
 }
 
-void check_clutch(const Clutch& c) {
-    const std::string_view kind = c.b.empty() ? "brake" : "clutch";
-    const Check check(kind, c.name);
+// ---- what each kind of connector asks of its parameters; its links are looked at for all of them alike --------
+
+void check_parameters(const Check& check, const Shaft& e) {
+    check.positive("stiffness", e.stiffness);
+    check.not_negative("damping", e.damping);
+    check.any("initial_twist", e.initial_twist);
+}
+
+void check_parameters(const Check& check, const Backlash& b) {
+    check.positive("stiffness", b.stiffness);
+    check.not_negative("damping", b.damping);
+    check.positive("gap", b.gap);
+    check.any("initial_twist", b.initial_twist);
+}
+
+void check_parameters(const Check& check, const Damper& k) {
+    check.positive("damping", k.damping);
+}
+
+void check_parameters(const Check& check, const Clutch& c) {
     check.not_negative("radius", c.radius);
     if (const auto* dry = std::get_if<DryFriction>(&c.friction)) {
         check.positive("sliding_capacity", dry->sliding_capacity);
@@ -181,8 +192,61 @@ void check_clutch(const Clutch& c) {
     }
 }
 
-void check_engine(const Engine& e) {
-    const Check check("engine", e.name);
+void check_parameters(const Check& check, const Freewheel& f) {
+    check.positive("rated_torque", f.rated_torque);
+    check.share("sliding_share", f.sliding_share);
+    check.not_negative("drag_torque", f.drag_torque);
+}
+
+void check_parameters(const Check& check, const Gear& g) {
+    check.not_zero("ratio", g.ratio);
+    check.share("efficiency", g.efficiency);
+    if (g.backward_efficiency != 0) check.share("backward_efficiency", g.backward_efficiency);
+    check.not_negative("bearing_torque", g.bearing_torque);
+    check.any("backward_bearing_torque", g.backward_bearing_torque);
+    for (const auto& option : g.options) check.not_zero("options", option.second);
+}
+
+void check_parameters(const Check& check, const Planetary& p) {
+    check.not_zero("ratio", p.ratio);
+    if (p.ratio == 1) check.fail("ratio", "= 1; sun and ring would turn as one whatever the carrier does");
+    check.share("efficiency", p.efficiency);
+}
+
+void check_parameters(const Check& check, const BrixiusTyre& t) {
+    check.positive("radius", t.radius);
+    check.positive("mobility_number", t.mobility_number);
+    check.positive("relaxation_length", t.relaxation_length);
+    check.not_negative("slip_damping_time", t.slip_damping_time);
+    check.positive("weight", t.weight);
+    check.not_negative("rolling_coefficient", t.rolling_coefficient);
+}
+
+void check_parameters(const Check& check, const TorqueConverter& c) {
+    check.rising("k_over_speed_ratio", c.k_over_speed_ratio);
+    check.rising("torque_ratio_over_speed_ratio", c.torque_ratio_over_speed_ratio);
+}
+
+void check_parameters(const Check& check, const TorqueSource& source) {
+    check_waveform(check, "waveform", source.waveform);
+    check.not_negative("quadratic", source.quadratic);
+}
+
+void check_parameters(const Check& check, const Road& road) {
+    check.not_negative("mass", road.mass);
+    check.not_negative("air_coefficient", road.air_coefficient);
+}
+
+void check_parameters(const Check& check, const Plough& p) {
+    check.positive("soil_factor", p.soil_factor);
+    check.positive("a", p.a);
+    check.not_negative("b", p.b);
+    check.not_negative("c", p.c);
+    check.positive("width", p.width);
+    check.positive("depth", p.depth);
+}
+
+void check_parameters(const Check& check, const Engine& e) {
     check.rising("full_load", e.full_load);
     check.positive("governor_slope", e.governor_slope);
     check.positive("low_idle", e.low_idle);
@@ -201,35 +265,17 @@ void check_engine(const Engine& e) {
 
 void check_unique_names(const Description& d) {
     std::map<std::string, std::string> seen;
-    const auto add = [&](const char* kind, const auto& devices) {
-        for (const auto& device : devices) {
-            const auto [at, fresh] = seen.emplace(device.name, kind);
-            if (!fresh) {
-                throw ModelError(kind, device.name, "name",
-                                 "= \"" + device.name + "\" is already the name of a " + at->second);
-            }
-        }
+    const auto add = [&](const char* what, const std::string& name) {
+        const auto [at, fresh] = seen.emplace(name, what);
+        if (!fresh)
+            throw ModelError(what, name, "name", "= \"" + name + "\" is already the name of a " + at->second);
     };
-    for (const Mass& mass : d.masses) {
-        if (!seen.emplace(mass.name, "mass").second) {
-            throw ModelError("mass", mass.name, "name", "= \"" + mass.name + "\" is already the name of a mass");
-        }
-    }
+    for (const Mass& mass : d.masses) add("mass", mass.name);
     // A mass may lend its name to a device (the engine on the mass "engine"); two devices may not share one.
     seen.clear();
-    add("shaft", d.shafts);
-    add("damper", d.dampers);
-    add("clutch", d.clutches);
-    add("gear", d.gears);
-    add("planetary row", d.planetaries);
-    add("tyre", d.tyres);
-    add("converter", d.converters);
-    add("engine", d.engines);
-    add("source", d.sources);
-    add("road", d.roads);
-    add("plough", d.ploughs);
+    for_each_connector(d, [&](const auto& device) { add(kind(device), device.name); });
     seen.clear();
-    add("sensor", d.sensors);
+    for (const SpeedSensor& sensor : d.sensors) add("sensor", sensor.name);
 }
 
 }  // namespace
@@ -244,98 +290,20 @@ void validate(const Description& d) {
     check_unique_names(d);
 
     Joints joints(d);
-    for (const Shaft& e : d.shafts) {
-        const Check check("shaft", e.name);
-        check.positive("stiffness", e.stiffness);
-        check.not_negative("damping", e.damping);
-        check.any("initial_twist", e.initial_twist);
-        joints.link("shaft", e.name, "a", e.a);
-        joints.link("shaft", e.name, "b", e.b);
-        distinct("shaft", e.name, "b", e.a, e.b);
-    }
-    for (const Damper& k : d.dampers) {
-        Check("damper", k.name).positive("damping", k.damping);
-        joints.link("damper", k.name, "a", k.a);
-        if (!k.b.empty()) joints.link("damper", k.name, "b", k.b);
-        distinct("damper", k.name, "b", k.a, k.b);
-    }
-    for (const Clutch& c : d.clutches) {
-        check_clutch(c);
-        const char* kind = c.b.empty() ? "brake" : "clutch";
-        joints.link(kind, c.name, "a", c.a);
-        if (!c.b.empty()) joints.link(kind, c.name, "b", c.b);
-        distinct(kind, c.name, "b", c.a, c.b);
-    }
-    for (const Gear& g : d.gears) {
-        const Check check("gear", g.name);
-        check.not_zero("ratio", g.ratio);
-        check.efficiency("efficiency", g.efficiency);
-        if (g.backward_efficiency != 0) check.efficiency("backward_efficiency", g.backward_efficiency);
-        check.not_negative("bearing_torque", g.bearing_torque);
-        check.any("backward_bearing_torque", g.backward_bearing_torque);
-        for (const auto& option : g.options) check.not_zero("options", option.second);
-        joints.link("gear", g.name, "a", g.a);
-        joints.link("gear", g.name, "b", g.b);
-        distinct("gear", g.name, "b", g.a, g.b);
-    }
-    for (const Planetary& p : d.planetaries) {
-        const Check check("planetary row", p.name);
-        check.not_zero("ratio", p.ratio);
-        if (p.ratio == 1) check.fail("ratio", "= 1; sun and ring would turn as one whatever the carrier does");
-        check.efficiency("efficiency", p.efficiency);
-        joints.link("planetary row", p.name, "sun", p.sun);
-        joints.link("planetary row", p.name, "ring", p.ring);
-        joints.link("planetary row", p.name, "carrier", p.carrier);
-        distinct("planetary row", p.name, "ring", p.sun, p.ring);
-        distinct("planetary row", p.name, "carrier", p.sun, p.carrier);
-        distinct("planetary row", p.name, "carrier", p.ring, p.carrier);
-    }
-    for (const BrixiusTyre& t : d.tyres) {
-        const Check check("tyre", t.name);
-        check.positive("radius", t.radius);
-        check.positive("mobility_number", t.mobility_number);
-        check.positive("relaxation_length", t.relaxation_length);
-        check.not_negative("slip_damping_time", t.slip_damping_time);
-        check.positive("weight", t.weight);
-        check.not_negative("rolling_coefficient", t.rolling_coefficient);
-        joints.link("tyre", t.name, "wheel", t.wheel);
-        joints.link("tyre", t.name, "body", t.body);
-        distinct("tyre", t.name, "body", t.wheel, t.body);
-    }
-    for (const TorqueConverter& c : d.converters) {
-        const Check check("converter", c.name);
-        check.rising("k_over_speed_ratio", c.k_over_speed_ratio);
-        check.rising("torque_ratio_over_speed_ratio", c.torque_ratio_over_speed_ratio);
-        joints.link("converter", c.name, "pump", c.pump);
-        joints.link("converter", c.name, "turbine", c.turbine);
-        distinct("converter", c.name, "turbine", c.pump, c.turbine);
-    }
-    for (const Engine& e : d.engines) {
-        check_engine(e);
-        joints.link("engine", e.name, "mass", e.mass);
-    }
-    for (const TorqueSource& source : d.sources) {
-        const Check check("source", source.name);
-        check_waveform(check, "waveform", source.waveform);
-        check.not_negative("quadratic", source.quadratic);
-        joints.link("source", source.name, "mass", source.mass);
-    }
-    for (const Road& road : d.roads) {
-        const Check check("road", road.name);
-        check.not_negative("mass", road.mass);
-        check.not_negative("air_coefficient", road.air_coefficient);
-        joints.link("road", road.name, "body", road.body);
-    }
-    for (const Plough& p : d.ploughs) {
-        const Check check("plough", p.name);
-        check.positive("soil_factor", p.soil_factor);
-        check.positive("a", p.a);
-        check.not_negative("b", p.b);
-        check.not_negative("c", p.c);
-        check.positive("width", p.width);
-        check.positive("depth", p.depth);
-        joints.link("plough", p.name, "body", p.body);
-    }
+    for_each_connector(d, [&](const auto& device) {
+        const Check check(kind(device), device.name);
+        check_parameters(check, device);
+        const auto links = ends(device);
+        for (std::size_t i = 0; i < links.size(); ++i) {
+            if (!links[i].may_be_housing || !links[i].mass.empty())
+                joints.link(kind(device), device.name, links[i].field, links[i].mass);
+            for (std::size_t first = 0; first < i; ++first) {
+                if (links[first].mass == links[i].mass)
+                    check.fail(links[i].field,
+                               "= \"" + links[i].mass + "\"; both links end on the same mass");
+            }
+        }
+    });
     for (const SpeedSensor& sensor : d.sensors) {
         const Check check("sensor", sensor.name);
         if (!sensor.ideal && sensor.teeth < 1) {

@@ -97,6 +97,9 @@ std::vector<std::string> Bus::summary() const {
         add(r.name, {{"of wrong length", r.wrong_length}, {"with wrong checksum", r.wrong_checksum}, {"with wrong counter", r.wrong_counter},
                      {"implausible", r.implausible}, {"missed", r.missed}, {"time-outs", r.timeouts},
                      {"values limited", r.limited}, {"not sent", r.send_dropped}});
+    for (const auto& t : can_->troubles())
+        add("trouble code SPN " + std::to_string(t.spn) + " FMI " + std::to_string(t.fmi) + " of " + t.node,
+            {{t.active ? "times active, the last to the end" : "times active", t.occurrences}});
     const auto c = port_->counters();
     if (name_ != "inprocess") add("as a whole", {{"frames sent", c.sent}, {"received", c.received}});
     add("as a whole", {{"frames not sent", c.send_dropped}, {"frames lost in reception", c.receive_dropped}, {"malformed", c.malformed},

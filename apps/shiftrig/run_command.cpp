@@ -125,9 +125,12 @@ std::string in_one_line(const rt::Refusals& refusals) {
     return line;
 }
 
-// Runs the loop in a thread of its own; this one shows the live line and watches the controller's process.
-void run_loop(rig::Session& session, const RunOptions& options, LiveLine& live, Child* controller) {
+// Runs the loop in a thread of its own; this one shows the live line, watches the controller's process and says once if
+// lockstep waits for a controller that does not answer.
+void run_loop(rig::Session& session, const RunOptions& options, LiveLine& live, Child* controller,
+              const std::atomic<bool>& unanswered) {
     std::atomic<bool> done{false};
+    bool complained = false;
     std::thread plant([&] {
         prepare_thread(options);
         session.run();
@@ -136,6 +139,11 @@ void run_loop(rig::Session& session, const RunOptions& options, LiveLine& live, 
     while (!done) {
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
         live.show();
+        if (unanswered && !complained) {
+            complained = true;
+            std::cerr << (live.shown() ? "\n" : "") << "lockstep: the controller has not answered for " << options.answer_timeout_s
+                      << " s (--answer-timeout); so long is waited for each command cycle\n";
+        }
         if (controller)
             if (const auto how = controller->ended()) std::cerr << (live.shown() ? "\n" : "") << *how << '\n';
     }
@@ -203,7 +211,9 @@ int run(const RunOptions& options) {
     session_options.trace = beside.trace.get();
     session_options.facts["not granted"] = in_one_line(refusals);
     session_options.facts["machine"] = rt::describe_machine();
-    session_options.after = [&](rig::Rig& each, const rt::Tick&) {
+    std::atomic<bool> unanswered{false};
+    session_options.after = [&](rig::Rig& each, const rt::Tick& tick) {
+        if (!tick.answered) unanswered = true;
         live.take(each);
         if (taker) taker->offer(each);
     };
@@ -216,7 +226,7 @@ int run(const RunOptions& options) {
     }
     {
         const SignalsStop signals_stop(session.control());
-        run_loop(session, options, live, controller ? &*controller : nullptr);
+        run_loop(session, options, live, controller ? &*controller : nullptr, unanswered);
     }
     controller.reset();
 

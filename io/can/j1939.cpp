@@ -10,7 +10,6 @@ namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::int64_t kClaimWait = 250 * kMs;
-constexpr std::int64_t kDm1Cycle = 1000 * kMs;
 constexpr std::string_view kSoftware = "shiftrig*";
 
 // Addresses of the preferred and the self-configuring top range may speak without waiting.
@@ -180,7 +179,7 @@ bool Network::answer(Node& node, std::uint32_t pgn, std::uint8_t asker, std::int
     }
     if (node.claim != Claim::claimed) return true;  // silent
     if (pgn == kDm1) {
-        send_dm1(node, asker, now_ns, port);
+        troubles.answer(node.address, asker, now_ns, port, transport);
         return true;
     }
     if (pgn == kSoftwareIdentification) {
@@ -231,75 +230,17 @@ void Network::run(std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME {
         }
     }
     started_ = true;
+}
 
-    if (!faults_changed_ && now_ns < dm1_due_ns_) return;
-    bool any = false;
-    for (std::size_t i = 0; i < fault_count_; ++i) any = any || faults_[i].active;
-    if (any || faults_told_)
-        for (const auto& node : nodes_) {
-            const bool concerned =
-                std::any_of(faults_.begin(), faults_.begin() + static_cast<std::ptrdiff_t>(fault_count_),
-                            [&](const Fault& f) { return f.address == node.address; });
-            if (concerned && node.claim == Claim::claimed) send_dm1(node, kEverybody, now_ns, port);
-        }
-    faults_told_ = any;
-    faults_changed_ = false;
-    dm1_due_ns_ = now_ns + kDm1Cycle;
+void Network::tell_troubles(std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME {
+    troubles.run(now_ns, port, transport,
+                 [this](std::uint8_t address) SHIFTRIG_REALTIME { return may_send(address); });
 }
 
 void Network::send_claim(const Node& node, std::uint8_t as, std::int64_t now_ns,
                          CanPort& port) SHIFTRIG_REALTIME {
     Frame frame = frame_of((6U << 26) | (kAddressClaimed << 8) | (std::uint32_t{kEverybody} << 8) | as);
     for (std::size_t i = 0; i < 8; ++i) frame.data[i] = static_cast<std::uint8_t>(node.bits >> (8 * i));
-    port.send(now_ns, frame);
-}
-
-bool Network::set_fault(std::uint32_t spn, std::uint8_t fmi, bool active,
-                        std::uint8_t address) SHIFTRIG_REALTIME {
-    if (!node_at(address) && !nodes_.empty()) address = nodes_.front().address;
-    Fault* fault = nullptr;
-    for (std::size_t i = 0; i < fault_count_; ++i)
-        if (faults_[i].spn == spn && faults_[i].fmi == fmi && faults_[i].address == address)
-            fault = &faults_[i];
-    if (!fault) {
-        if (!active) return true;
-        if (fault_count_ == faults_.size()) return false;
-        fault = &faults_[fault_count_++];
-        *fault = {spn, fmi, address, 0, false};
-    }
-    if (fault->active == active) return true;
-    if (active && fault->occurrences < 126) ++fault->occurrences;
-    fault->active = active;
-    faults_changed_ = true;
-    return true;
-}
-
-void Network::send_dm1(const Node& node, std::uint8_t to, std::int64_t now_ns,
-                       CanPort& port) SHIFTRIG_REALTIME {
-    LongMessage message;
-    message.pgn = kDm1;
-    message.source = node.address;
-    message.destination = to;
-    message.data[1] = 0xFF;  // no lamp flashes
-    message.length = 2;
-    for (std::size_t i = 0; i < fault_count_; ++i) {
-        const Fault& fault = faults_[i];
-        if (!fault.active || fault.address != node.address) continue;
-        message.data[0] = 0x04;  // amber warning lamp
-        message.data[message.length++] = static_cast<std::uint8_t>(fault.spn);
-        message.data[message.length++] = static_cast<std::uint8_t>(fault.spn >> 8);
-        message.data[message.length++] =
-            static_cast<std::uint8_t>(((fault.spn >> 11) & 0xE0U) | (fault.fmi & 0x1FU));
-        message.data[message.length++] = fault.occurrences;
-    }
-    if (message.length > 6) {
-        transport.send(message);
-        return;
-    }
-    // One fault or none fits into a frame: four bytes of zeros say none.
-    Frame frame = frame_of((6U << 26) | (kDm1 << 8) | node.address);
-    std::fill_n(frame.data.begin() + 2, 4, std::uint8_t{0});
-    std::copy_n(message.data.begin(), message.length, frame.data.begin());
     port.send(now_ns, frame);
 }
 

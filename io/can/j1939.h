@@ -3,7 +3,6 @@
 // caller's; nothing allocates after construction.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -12,12 +11,12 @@
 #include "io/can/j1939_transport.h"
 #include "io/can/link.h"
 #include "io/can/mapping.h"
+#include "io/can/trouble_codes.h"
 
 namespace shiftrig::io::can::j1939 {
 
 constexpr std::uint32_t kRequest = 0xEA00, kAcknowledgement = 0xE800, kAddressClaimed = 0xEE00,
-                        kTransport = 0xEC00, kTransportData = 0xEB00, kDm1 = 0xFECA,
-                        kSoftwareIdentification = 0xFEDA;
+                        kTransport = 0xEC00, kTransportData = 0xEB00, kSoftwareIdentification = 0xFEDA;
 
 // The 64-bit NAME of a controller; the lower of two wins an address.
 struct Name {
@@ -41,9 +40,9 @@ class Network {
         std::uint8_t address = 0;
         std::uint64_t bits = 0;  // NAME
         Claim claim = Claim::unclaimed;
-        std::int64_t claimed_at_ns = 0;     // when waiting ends
+        std::int64_t claimed_at_ns = 0;        // when waiting ends
         std::int64_t cannot_claim_ns = kSaid;  // when to say so
-        bool announce = false;              // send the claim at the next opportunity
+        bool announce = false;                 // send the claim at the next opportunity
     };
 
     // The nodes whose messages this role sends.
@@ -52,33 +51,30 @@ class Network {
     // Looks at every extended frame. A request for a message of ours comes out of `requested`.
     void take(const Frame& frame, std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
     bool requested(std::uint32_t& pgn, std::uint8_t& address) SHIFTRIG_REALTIME;
-    // Sends what is due.
+    // Sends what is due of claims and long messages.
     void run(std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
+    // And of trouble codes.
+    void tell_troubles(std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
     bool may_send(std::uint8_t address) const SHIFTRIG_REALTIME;
 
     // For all PGNs we answer by sending a message; others are answered by a negative acknowledgement.
     void add_answer(std::uint32_t pgn, std::uint8_t address) { answers_.push_back({pgn, address}); }
-    // False if no more than 32 faults fit.
-    bool set_fault(std::uint32_t spn, std::uint8_t fmi, bool active, std::uint8_t address) SHIFTRIG_REALTIME;
 
     const std::vector<Node>& nodes() const noexcept { return nodes_; }
     void archive(Archive& a) {
         transport.archive(a);
         requests_.archive(a);
         for (Node& node : nodes_) a(node.claim, node.claimed_at_ns, node.cannot_claim_ns, node.announce);
-        a(faults_, fault_count_, faults_told_, faults_changed_, dm1_due_ns_, started_);
+        troubles.archive(a);
+        a(started_);
     }
     Transport transport;
+    TroubleCodes troubles;
 
   private:
     struct Answer {
         std::uint32_t pgn;
         std::uint8_t address;
-    };
-    struct Fault {
-        std::uint32_t spn = 0;
-        std::uint8_t fmi = 0, address = 0, occurrences = 0;
-        bool active = false;
     };
     Node* node_at(std::uint8_t address) SHIFTRIG_REALTIME;
     void hear_claim(const Frame& frame, std::int64_t now_ns) SHIFTRIG_REALTIME;
@@ -86,15 +82,9 @@ class Network {
     bool answer(Node& node, std::uint32_t pgn, std::uint8_t asker, std::int64_t now_ns,
                 CanPort& port) SHIFTRIG_REALTIME;
     void send_claim(const Node& node, std::uint8_t as, std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
-    void send_dm1(const Node& node, std::uint8_t to, std::int64_t now_ns, CanPort& port) SHIFTRIG_REALTIME;
 
     std::vector<Node> nodes_;
     std::vector<Answer> answers_;
-    std::array<Fault, 32> faults_;
-    std::size_t fault_count_ = 0;
-    bool faults_told_ = false;  // DM1 must still say that there are none any more
-    bool faults_changed_ = false;
-    std::int64_t dm1_due_ns_ = INT64_MIN;
     Ring<Answer> requests_{32};
     AddressClaim mode_;
     bool started_ = false;

@@ -26,6 +26,14 @@ class Transport {
   public:
     // Queues a message; false if eight are waiting already.
     bool send(const LongMessage& message) SHIFTRIG_REALTIME { return waiting_.push(message); }
+    bool full() const SHIFTRIG_REALTIME { return waiting_.full(); }
+    // A message of this node to everybody is waiting or being sent.
+    bool announces(std::uint8_t source) const SHIFTRIG_REALTIME {
+        const auto announced = [source](const LongMessage& message) SHIFTRIG_REALTIME {
+            return message.source == source && message.destination == kEverybody;
+        };
+        return (phase_ != Phase::idle && announced(sending_)) || waiting_.any(announced);
+    }
     // A frame of PGN 60416 or 60160. `ours` says whether an address is one we play.
     template <class Ours>
     void take(const Frame& frame, std::int64_t now_ns, CanPort& port, Ours ours) SHIFTRIG_REALTIME {

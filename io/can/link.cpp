@@ -211,7 +211,8 @@ bool CanLink::Data::judge_commands(std::int64_t now_ns, SignalTable& signals) SH
     for (ReceivedMessage& message : received) {
         if (!message.command) continue;
         any = true;
-        const bool heard = (message.seen_good || message.seen_bad) && now_ns - message.heard_ns <= message.timeout_ns;
+        const bool heard =
+            (message.seen_good || message.seen_bad) && now_ns - message.heard_ns <= message.timeout_ns;
         message.expected = message.expected || heard;
         some_heard = some_heard || heard;
         all_heard = all_heard && message.expected;
@@ -382,6 +383,23 @@ bool CanLink::Data::due(SentMessage& message, std::int64_t now_ns) SHIFTRIG_REAL
     return true;
 }
 
+// A code is active while one of its conditions is fulfilled; those of one code stand together.
+void CanLink::Data::find_troubles(std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REALTIME {
+    for (std::size_t i = 0; i < conditions.size();) {
+        const int code = conditions[i].code;
+        bool active = false;
+        for (; i < conditions.size() && conditions[i].code == code; ++i) {
+            Condition& condition = conditions[i];
+            const double value = signals.value[static_cast<std::size_t>(condition.index)];
+            const bool holds = value > condition.above && value < condition.below;
+            if (holds && !condition.holds) condition.since_ns = now_ns;
+            condition.holds = holds;
+            active = active || (holds && now_ns - condition.since_ns >= condition.after_ns);
+        }
+        network->troubles.set(code, active);
+    }
+}
+
 void CanLink::send(std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REALTIME {
     Data& d = *data_;
     if (!d.started_sending) {
@@ -396,7 +414,11 @@ void CanLink::send(std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REA
             if (field.use == Use::travelled)
                 field.travelled += elapsed * std::fabs(signals.value[static_cast<std::size_t>(field.index)]);
 
-    if (d.network) d.network->run(now_ns, *d.port);
+    if (d.network) {
+        d.find_troubles(now_ns, signals);
+        d.network->tell_troubles(now_ns, *d.port);
+        d.network->run(now_ns, *d.port);
+    }
     // The answer goes last: when it has arrived, all of this cycle has.
     const int last = d.options.role == Role::controller ? d.answer : d.question;
     for (int i = 0; i < static_cast<int>(d.sent.size()); ++i) {
@@ -425,10 +447,6 @@ bool CanLink::awaiting_answer() const SHIFTRIG_REALTIME {
 bool CanLink::question_pending() const SHIFTRIG_REALTIME {
     return data_->pending;
 }
-void CanLink::set_fault(std::uint32_t spn, std::uint8_t fmi, bool active,
-                        std::uint8_t source) SHIFTRIG_REALTIME {
-    if (data_->network) data_->network->set_fault(spn, fmi, active, source);
-}
 
 void CanLink::claim_addresses() {
     if (!data_->network) return;
@@ -455,6 +473,18 @@ std::vector<MessageReport> CanLink::report() const {
     std::vector<MessageReport> result;
     for (const auto& message : data_->sent) result.push_back(message.report);
     for (const auto& message : data_->received) result.push_back(message.report);
+    return result;
+}
+std::vector<TroubleReport> CanLink::troubles() const {
+    std::vector<TroubleReport> result;
+    if (!data_->network) return result;
+    for (const auto& code : data_->network->troubles.codes()) {
+        if (code.occurrences == 0) continue;
+        const auto& nodes = data_->network->nodes();
+        const auto owner = std::find_if(nodes.begin(), nodes.end(),
+                                        [&](const auto& n) { return n.address == code.address; });
+        result.push_back({code.spn, code.fmi, owner->name, code.occurrences, code.active});
+    }
     return result;
 }
 double CanLink::bus_load() const noexcept {

@@ -48,6 +48,15 @@ struct MessageReport {
     std::uint64_t send_dropped = 0;   // refused by the port
 };
 
+// A trouble code of ours [J1939-73].
+struct TroubleReport {
+    std::uint32_t spn = 0;
+    unsigned fmi = 0;
+    std::string node;          // whose it is
+    unsigned occurrences = 0;  // since start, 126 at most
+    bool active = false;       // now
+};
+
 // J1939 address claim of every source address this end plays.
 enum class AddressClaim : std::uint8_t {
     off,
@@ -89,15 +98,13 @@ class CanLink {
     bool awaiting_answer() const SHIFTRIG_REALTIME;
     bool question_pending() const SHIFTRIG_REALTIME;
 
-    // A fault of our own, told as DM1 [J1939-73] by the node at `source` while active (the transmission's sensors
-    // unless said otherwise).
-    void set_fault(std::uint32_t spn, std::uint8_t fmi, bool active,
-                   std::uint8_t source = 0x80) SHIFTRIG_REALTIME;
     // With AddressClaim::claim: claims our addresses now, in wall time, and waits until they are ours or lost (at
     // most about 0.3 s), so that the first tick may speak. Not for the loop.
     void claim_addresses();
 
     std::vector<MessageReport> report() const;
+    // The trouble codes that were active at least once, as DM1 told them.
+    std::vector<TroubleReport> troubles() const;
     // Load of the bus by all mapped messages of both ends, worst-case stuffing [1]; > 1 cannot work.
     double bus_load() const noexcept;
     // One line each, for the user, at start: bus overloaded, messages without a cycle time, …

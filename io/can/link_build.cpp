@@ -102,8 +102,10 @@ CanLink::Data::Data(const Mapping& mapping, CanPort& a_port, SignalTable& signal
 
     spread_phases();
     judge_load(mapping);
-    valid_index = own_signal(signals, "bus.command_valid",
-                             "1 while the command messages that the controller sends are trusted within their timeouts", 1);
+    valid_index = own_signal(
+        signals, "bus.command_valid",
+        "1 while the command messages that the controller sends are trusted within their timeouts", 1);
+    if (rig) build_troubles(mapping, signals);
 }
 
 // ---- one signal --------------------------------------------------------------------------------------------
@@ -239,8 +241,8 @@ void CanLink::Data::build_received(const Mapping& mapping, const dbc::Message& l
             entry.use == Use::constant || entry.use == Use::direction || entry.use == Use::travelled;
         if (!no_way_back) message.fields.push_back(build_field(mapping, layout, entry, true, signals));
     }
-    message.status_index =
-        own_signal(signals, "bus." + layout.name + ".status", "0 never seen, 1 alive, 2 late, 3 lost, 4 corrupt");
+    message.status_index = own_signal(signals, "bus." + layout.name + ".status",
+                                      "0 never seen, 1 alive, 2 late, 3 lost, 4 corrupt");
     received.push_back(std::move(message));
 }
 
@@ -368,6 +370,48 @@ void CanLink::Data::spread_phases() {
     }
 }
 
+// After everything else: a condition may look at the link's own signals.
+void CanLink::Data::build_troubles(const Mapping& mapping, const SignalTable& signals) {
+    const auto nodes = network ? network->nodes() : std::vector<j1939::Network::Node>{};
+    for (const TroubleMap& map : mapping.troubles) {
+        const std::string label =
+            "trouble code SPN " + std::to_string(map.spn) + " FMI " + std::to_string(map.fmi);
+        const auto owner = std::find_if(nodes.begin(), nodes.end(),
+                                        [&map](const auto& node) { return node.name == map.node; });
+        if (owner == nodes.end())
+            fail(mapping, map.line, map.column,
+                 label + ": " + map.node + " sends no J1939 message, so it has no address");
+        const int code =
+            network->troubles.add(map.spn, static_cast<std::uint8_t>(map.fmi), owner->address, map.lamp);
+        if (code < 0)
+            fail(mapping, map.line, map.column,
+                 label + ": " + map.node + " has more than the " +
+                     std::to_string(j1939::TroubleCodes::kMostOfANode) + " that its DM1 can hold");
+        for (const TroubleCondition& any : map.any_of) {
+            Condition condition;
+            condition.code = code;
+            condition.after_ns = to_ns(map.after_ms);
+            condition.index = signals.find(any.signal);
+            if (condition.index < 0)
+                fail(
+                    mapping, any.line, any.column,
+                    label + ": there is no signal \"" + any.signal + "\"" + suggestions(signals, any.signal));
+            const plant::Unit unit = signals.signal(condition.index).unit;
+            if (!any.above && !any.below) condition.above = 0.5;
+            const auto limit = [&](const std::optional<Quantity>& quantity, double& value) {
+                if (quantity) value = quantity->value;
+                if ((quantity ? quantity->unit : plant::Unit::one) != unit)
+                    fail(mapping, any.line, any.column,
+                         label + ": " + any.signal + " is " + in_unit(unit) + ", its limit is " +
+                             in_unit(quantity ? quantity->unit : plant::Unit::one));
+            };
+            if (any.above || !any.below) limit(any.above, condition.above);
+            if (any.below) limit(any.below, condition.below);
+            conditions.push_back(condition);
+        }
+    }
+}
+
 void CanLink::Data::judge_load(const Mapping& mapping) {
     for (const auto& map : mapping.messages) {
         const dbc::Message& layout = *mapping.database.find(map.name);
@@ -386,6 +430,11 @@ void CanLink::Data::judge_load(const Mapping& mapping) {
         }
         load += seconds / (1e-3 * cycle_ms);
     }
+    // DM1 once a second of every node that may have troubles.
+    std::vector<std::string> tellers;
+    for (const auto& map : mapping.troubles)
+        if (std::find(tellers.begin(), tellers.end(), map.node) == tellers.end()) tellers.push_back(map.node);
+    load += static_cast<double>(tellers.size()) * worst_case_classic_bits(true, 8) / mapping.bit_rate;
     if (load > 1)
         warnings.push_back(mapping.file + ": these messages would load a bus of " +
                            std::to_string(std::lround(mapping.bit_rate / 1000)) + " kbit/s to " +

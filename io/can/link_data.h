@@ -93,6 +93,17 @@ struct SentMessage {
     bool by_transport = false;  // more than 8 bytes on a classic J1939 bus
 };
 
+// Of a trouble code: fulfilled while above < value < below has held for `after_ns`.
+struct Condition {
+    int index = -1;                        // in the signal table
+    double above = -1e300, below = 1e300;  // [the signal's unit]
+    std::int64_t after_ns = 0;
+    int code = -1;  // of network->troubles
+
+    bool holds = false;
+    std::int64_t since_ns = 0;
+};
+
 struct CanLink::Data {
     Data(const Mapping& mapping, CanPort& port, SignalTable& signals, const LinkOptions& options);
 
@@ -108,6 +119,7 @@ struct CanLink::Data {
     void build_look_up();
     void settle_duplicates(const Mapping& mapping, const SignalTable& signals);
     void spread_phases();
+    void build_troubles(const Mapping& mapping, const SignalTable& signals);
     void judge_load(const Mapping& mapping);
 
     // running
@@ -123,6 +135,7 @@ struct CanLink::Data {
     void transmit(SentMessage& message, std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REALTIME;
     bool due(SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME;
     bool put_on_bus(SentMessage& message, std::int64_t now_ns) SHIFTRIG_REALTIME;
+    void find_troubles(std::int64_t now_ns, const SignalTable& signals) SHIFTRIG_REALTIME;
     void hear_network(std::int64_t now_ns, SignalTable& signals) SHIFTRIG_REALTIME;
 
     CanPort* port;
@@ -136,7 +149,8 @@ struct CanLink::Data {
     std::vector<LookUp> look_up;  // sorted by key
     std::array<Frame, 64> buffer;
     std::optional<j1939::Network> network;
-    std::vector<int> address_index;  // signal `bus.<node>.address` of each of the network's nodes
+    std::vector<Condition> conditions;  // by code
+    std::vector<int> address_index;     // signal `bus.<node>.address` of each of the network's nodes
     std::vector<std::string> warnings;
     double load = 0;
     int valid_index = -1;
@@ -152,7 +166,8 @@ struct CanLink::Data {
     unsigned question_counter = 0;
     std::int64_t question_ns = 0;
 
-    std::int64_t command_arrived_ns = 0;  // stamp of the oldest command that no frame sent reflects yet; 0: none
+    std::int64_t command_arrived_ns =
+        0;  // stamp of the oldest command that no frame sent reflects yet; 0: none
 };
 
 // The part of an identifier that names what a frame is about, see link.cpp.

@@ -27,6 +27,7 @@ void CanLink::archive(Archive& a) {
     a(d.started_receiving, d.started_sending, d.valid, d.receive_start_ns, d.last_send_ns);
     a(d.hearing_commands, d.commands_gathered, d.commands_began_ns);
     if (d.network) d.network->archive(a);
+    for (Condition& c : d.conditions) a(c.holds, c.since_ns);
     a(d.awaiting, d.pending, d.asked_before, d.question_counter, d.question_ns, d.command_arrived_ns);
 }
 

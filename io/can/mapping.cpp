@@ -24,7 +24,8 @@ class Reader {
         Mapping result;
         result.file = file_;
         keys(node, "the mapping",
-             {"dbc", "bit_rate", "data_bit_rate", "protocol", "rig_nodes", "lockstep", "name", "messages"});
+             {"dbc", "bit_rate", "data_bit_rate", "protocol", "rig_nodes", "lockstep", "name", "messages",
+              "trouble_codes"});
         const std::string dbc = need(node, "dbc").as<std::string>();
         result.database = dbc::read((std::filesystem::path(file_).parent_path() / dbc).string());
         if (node["bit_rate"]) result.bit_rate = positive(node["bit_rate"], "bit_rate");
@@ -51,6 +52,7 @@ class Reader {
             if (name["identity"])
                 result.identity = static_cast<std::uint32_t>(integer(name["identity"], 0, 0x1FFFFF));
         }
+        for (const auto& entry : node["trouble_codes"]) troubles(entry, result);
         return result;
     }
 
@@ -150,8 +152,12 @@ class Reader {
             result.is = integer(node["is"], 0, INT64_MAX);
             if (node["else"]) result.otherwise_raw = integer(node["else"], 0, INT64_MAX);
         }
-        if (node["per"]) result.per = quantity_of(node["per"]);
-        if (node["times"]) result.times = quantity_of(node["times"]);
+        for (const char* key : {"per", "times"}) {
+            if (!node[key]) continue;
+            const Quantity factor = quantity_of(node[key]);
+            if (factor.value == 0) fail(node[key], label + ": " + key + " must not be 0");
+            (key[0] == 'p' ? result.per : result.times) = factor;
+        }
         if (const YAML::Node range = node["plausible"]) {
             if (!range.IsSequence() || range.size() != 2)
                 fail(range, label + ": plausible must be [lowest, highest]");
@@ -162,12 +168,63 @@ class Reader {
         if (const YAML::Node when = node["when"]) {
             if (!when.IsMap() || when.size() != 1)
                 fail(when, label + ": when must be {SIGNAL: [raw values]}");
-            const YAML::detail::iterator_value entry = *when.begin();  // the iterator's arrow yields a temporary
+            const YAML::detail::iterator_value entry =
+                *when.begin();  // the iterator's arrow yields a temporary
             result.when = layout_signal(entry.first, layout);
-            for (const auto& value : entry.second)
-                result.when_is.push_back(integer(value, 0, INT64_MAX));
+            for (const auto& value : entry.second) result.when_is.push_back(integer(value, 0, INT64_MAX));
             result.otherwise = number(need(node, "otherwise"));
         }
+        return result;
+    }
+
+    // One entry of `trouble_codes`: a component, and what can be wrong with it.
+    void troubles(const YAML::Node& node, Mapping& mapping) const {
+        keys(node, "trouble_codes", {"spn", "of", "lamp", "after_ms", "fmi"});
+        TroubleMap code;
+        code.spn = static_cast<std::uint32_t>(integer(need(node, "spn"), 1, 0x7FFFF));
+        code.node = text(need(node, "of"));
+        const auto& ours = mapping.rig_nodes;
+        if (std::find(ours.begin(), ours.end(), code.node) == ours.end())
+            fail(node["of"], "trouble_codes: \"" + code.node + "\" is none of the rig_nodes");
+        code.lamp = one_of<j1939::Lamp>(need(node, "lamp"), "lamp",
+                                        {{"none", j1939::Lamp::none},
+                                         {"protect", j1939::Lamp::protect},
+                                         {"amber", j1939::Lamp::amber},
+                                         {"red", j1939::Lamp::red},
+                                         {"malfunction", j1939::Lamp::malfunction}});
+        if (node["after_ms"]) code.after_ms = positive(node["after_ms"], "after_ms");
+        if (!need(node, "fmi").IsMap()) fail(node["fmi"], "fmi: {5: sensor.output.dropout, …} is wanted");
+        for (const auto& entry : node["fmi"]) {
+            code.fmi = static_cast<unsigned>(integer(entry.first, 0, 31));
+            code.line = entry.first.Mark().line + 1;
+            code.column = entry.first.Mark().column + 1;
+            for (const auto& other : mapping.troubles)
+                if (other.spn == code.spn && other.fmi == code.fmi && other.node == code.node)
+                    fail(entry.first, "trouble_codes: SPN " + std::to_string(code.spn) + " FMI " +
+                                          std::to_string(code.fmi) + " of " + code.node + " stands in line " +
+                                          std::to_string(other.line) + " already");
+            code.any_of.clear();
+            if (entry.second.IsSequence())
+                for (const auto& each : entry.second) code.any_of.push_back(condition(each));
+            else
+                code.any_of.push_back(condition(entry.second));
+            mapping.troubles.push_back(code);
+        }
+    }
+
+    TroubleCondition condition(const YAML::Node& node) const {
+        TroubleCondition result;
+        result.line = node.Mark().line + 1;
+        result.column = node.Mark().column + 1;
+        if (node.IsScalar()) {
+            result.signal = text(node);
+            return result;
+        }
+        keys(node, "trouble_codes", {"signal", "above", "below"});
+        result.signal = text(need(node, "signal"));
+        if (node["above"]) result.above = quantity_of(node["above"]);
+        if (node["below"]) result.below = quantity_of(node["below"]);
+        if (!result.above && !result.below) fail(node, "trouble_codes: above or below is missing");
         return result;
     }
 
@@ -183,7 +240,7 @@ class Reader {
         const auto [rest, error] = std::from_chars(written.data(), written.data() + written.size(), value);
         const auto unit =
             unit_conversion({rest, static_cast<std::size_t>(written.data() + written.size() - rest)});
-        if (error != std::errc{} || !unit || value == 0)
+        if (error != std::errc{} || !unit)
             fail(node, "\"" + written + "\" is not a number with a unit, such as 1201 Nm");
         return {value * unit->factor + unit->offset, unit->unit};
     }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "io/can/dbc.h"
+#include "io/can/trouble_codes.h"
 #include "plant/signal.h"
 
 namespace shiftrig::io::can {
@@ -68,6 +69,24 @@ struct MessageMap {
     int line = 0, column = 0;
 };
 
+// What a trouble code is raised by: a value above and below its limits, as far as there are any.
+struct TroubleCondition {
+    std::string signal;
+    std::optional<Quantity> above, below;  // none: a plain number > 0.5
+    int line = 0, column = 0;
+};
+
+// A fault of the rig's own that goes out as DM1 [J1939-73].
+struct TroubleMap {
+    std::uint32_t spn = 0;
+    unsigned fmi = 0;
+    std::string node;  // in the DBC, one of rig_nodes: whose fault it is
+    j1939::Lamp lamp = j1939::Lamp::amber;
+    double after_ms = 0;  // how long a condition must hold
+    std::vector<TroubleCondition> any_of;
+    int line = 0, column = 0;
+};
+
 struct Mapping {
     std::string file;
     dbc::Database database;
@@ -79,6 +98,7 @@ struct Mapping {
     std::uint16_t manufacturer = 0;      // of the NAMEs claimed [J1939-81]
     std::uint32_t identity = 1;
     std::vector<MessageMap> messages;
+    std::vector<TroubleMap> troubles;
 
     const MessageMap* find(std::string_view message) const noexcept;
     bool sent_by_rig(const dbc::Message& message) const noexcept;

@@ -26,6 +26,12 @@ class Ring {
         first_ = (first_ + 1) % items_.size();
         --count_;
     }
+    template <class Predicate>
+    bool any(Predicate predicate) const noexcept {
+        for (std::size_t i = 0; i < count_; ++i)
+            if (predicate(items_[(first_ + i) % items_.size()])) return true;
+        return false;
+    }
     void clear() noexcept { first_ = count_ = 0; }
 
     // Only the items that are in it.

@@ -64,15 +64,18 @@ void SocketCan::open() {
 
 std::string SocketCan::open_socket(int& fd) noexcept {
     if (interface_.size() >= IFNAMSIZ) return "an interface's name has at most 15 characters";
-    const unsigned index = if_nametoindex(interface_.c_str());
-    if (index == 0)
-        return "there is no such interface; make a virtual one: sudo ip link add dev " + interface_ +
-               " type vcan && sudo ip link set up " + interface_;
+    // The kernel before the interface: where it has no CAN, nobody can make one.
     fd = ::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
     if (fd < 0) {
         if (errno == EAFNOSUPPORT || errno == EPROTONOSUPPORT)
             return "this kernel has no CAN (sudo modprobe can_raw); without it use udpcan:239.74.163.2:43113";
         return std::string("cannot open a CAN socket: ") + std::strerror(errno);
+    }
+    const unsigned index = if_nametoindex(interface_.c_str());
+    if (index == 0) {
+        ::close(std::exchange(fd, -1));
+        return "there is no such interface; make a virtual one: sudo ip link add dev " + interface_ +
+               " type vcan && sudo ip link set up " + interface_;
     }
     // Filters first: nothing foreign may arrive between bind and filter.
     std::vector<can_filter> kernel_filters;

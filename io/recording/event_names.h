@@ -36,6 +36,10 @@ inline std::string_view name(plant::EventKind kind) {
             return "facing_warning";
         case K::facing_failure:
             return "facing_failure";
+        case K::flank_closes:
+            return "flank_closes";
+        case K::flank_opens:
+            return "flank_opens";
     }
     return "unknown";
 }

@@ -275,7 +275,7 @@ bool RecordingReader::Implementation::next(RecordedTick& tick) {
             happened.capacity = e.capacity_nm;
             happened.slip = e.slip_rad_s;
             if (e.device < -1 || e.device >= static_cast<std::int64_t>(manifest.devices.size()) ||
-                e.kind < 0 || e.kind > static_cast<std::int32_t>(plant::EventKind::facing_failure))
+                e.kind < 0 || e.kind > static_cast<std::int32_t>(plant::EventKind::flank_opens))
                 return damaged("an event of an unknown device or kind");
             tick.events.push_back(happened);
         } else if (event.channel == channel::record_timing) {

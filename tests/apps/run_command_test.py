@@ -192,6 +192,14 @@ class Results(InAFolder):
         self.assertIn('controller "exit 3" ended with status 3', done.stderr)
         self.assertEqual(json.loads(done.stdout.splitlines()[-1])["final"]["rig.safe_command"], 1)
 
+    def test_lockstep_says_once_that_nobody_answers(self):
+        done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "none", "--pace", "lockstep", "--duration", "0.5",
+                   "--answer-timeout", "0.02", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        said = [line for line in done.stderr.splitlines() if "has not answered" in line]
+        self.assertEqual(said, ["lockstep: the controller has not answered for 0.02 s (--answer-timeout); so long is waited "
+                                "for each command cycle"])
+
     def test_nothing_but_the_result_where_there_is_no_terminal(self):
         done = run("--scenario", SHIFT, "--pace", "free")
         self.assertEqual(done.returncode, 0)

@@ -120,7 +120,7 @@ TEST(StaticsCommand, AnOptionPutsItsRatioInUse) {
 TEST(StaticsCommand, WrongNamesAndNumbersAreOneLineAndCodeTwo) {
     Said said = statics({wt, "--closed", "C1,C9", "--input", "input=1"});
     EXPECT_EQ(said.exit_code, 2);
-    EXPECT_EQ(said.err, "shiftrig: model \"WT gearbox\": closed = \"C9\" is no clutch or brake\n");
+    EXPECT_EQ(said.err, "shiftrig: model \"WT gearbox\": closed = \"C9\" is no clutch, brake or freewheel\n");
     said = statics({wt, "--closed", "C1,C3", "--input", "input=one"});
     EXPECT_EQ(said.exit_code, 2);
     EXPECT_EQ(said.err,

@@ -17,6 +17,7 @@ import unittest
 
 RIG, TCU, SOURCE = sys.argv[1:4]
 SHIFT = SOURCE + "/config/scenarios/plough_upshift.yaml"
+SENSOR_LOSS = SOURCE + "/config/scenarios/speed_sensor_loss.yaml"
 CYCLES = {  # [ms], spec of the messages
     "0CF00400": 20, "0CF00300": 50, "0CF00203": 10, "18F00503": 100, "0C010305": 50, "0C000003": 10, "18FEF100": 100,
     "18F0010B": 100, "18FEF880": 1000, "0CFE48F0": 100, "0CFE49F0": 100, "18FF1003": 10, "18FF1103": 10, "18FF1203": 10,
@@ -150,6 +151,41 @@ class VcanRig(unittest.TestCase):
             if abs(found - wanted) > 0.02 * wanted:
                 wrong[identifier] = found
         self.assertEqual(wrong, {}, "cycle times [ms]")
+
+    def test_a_lost_sensor_is_told_as_dm1_while_it_is_lost(self):
+        with Candump() as dump, Controller("--lockstep"):
+            result_of(rig("--scenario", SENSOR_LOSS, "--pace", "lockstep"))
+        now, told = 0, []  # simulated time: feedback A ends each 10 ms
+        for _, identifier, data in dump.frames():
+            now += 10 if identifier == "18FF2080" else 0
+            if identifier == "18FECA80":
+                told.append((now, data))
+        lost = [(at, data) for at, data in told if data != "00FF00000000FFFF"]
+        self.assertEqual([data for _, data in lost], ["04FFBF000501FFFF"] * 4, told)  # amber, SPN 191, FMI 5, the first time
+        self.assertEqual([at for at, _ in lost], [2000, 3000, 4000, 5000])
+        self.assertEqual([at for at, _ in told if at > 5000], [6000, 7000, 8000, 9000])
+        self.assertGreaterEqual(len([at for at, _ in told if at < 2000]), 2, "none, before")
+
+    def test_the_kernel_puts_several_troubles_together_again(self):
+        with open(SENSOR_LOSS) as file:
+            scenario = file.read().replace("../tractor", SOURCE + "/config/tractor")
+        two = scenario.replace("  - {at_s: 2.0,", "  - {at_s: 2.0, sensor.input.stuck: 1}\n  - {at_s: 2.0,")
+        self.assertNotEqual(two, scenario)
+        with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file, \
+                socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, socket.CAN_J1939) as listener:
+            file.write(two)
+            file.flush()
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+            listener.bind(("vcan0", socket.J1939_NO_NAME, 0xFECA, socket.J1939_NO_ADDR))
+            listener.settimeout(60)
+            with Controller("--lockstep"):
+                process = rig("--scenario", file.name, "--duration", "4", "--pace", "lockstep")
+                while True:
+                    data, (_, _, pgn, source) = listener.recvfrom(300)
+                    if pgn == 0xFECA and source == 0x80 and len(data) > 8:
+                        break
+                result_of(process)
+        self.assertEqual(data.hex(), "04ff" "a1000201" "bf000501")  # SPN 161 FMI 2, SPN 191 FMI 5
 
     def test_a_command_made_by_hand_moves_the_clutch(self):
         with tempfile.NamedTemporaryFile("r", suffix=".csv") as table:

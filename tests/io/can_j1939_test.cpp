@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <numeric>
 
@@ -166,36 +167,180 @@ TEST_F(SettledNetwork, RequestsAreAnsweredAndWhatWeDoNotHaveIsRefused) {
     EXPECT_TRUE(of(0x18E8FF05).empty());
 }
 
-TEST_F(SettledNetwork, OneFaultIsADm1FrameEachSecondUntilItIsGoneAndThenOnceNone) {
-    run(10);
-    EXPECT_TRUE(of(0x18FECA80).empty());
-    link.set_fault(0x7F123, 4, true);
+TEST_F(SettledNetwork, EveryNodeThatMayHaveTroublesSaysOnceASecondThatItHasNone) {
+    run(3000);
+    for (const std::uint32_t address : {0x00U, 0x80U, 0xF0U}) {
+        const auto told = of(0x18FECA00U | address);
+        ASSERT_EQ(told.size(), 3U) << address;
+        for (const auto& frame : told) EXPECT_EQ(bytes(frame), "00FF00000000FFFF");
+        EXPECT_EQ(told[2].timestamp_ns - told[1].timestamp_ns, 1000 * kMs);
+    }
+    EXPECT_TRUE(of(0x18FECA05).empty()) << "the shift console has none of the mapping's codes";
+}
+
+TEST_F(SettledNetwork, ASensorThatFallsSilentIsToldAtOnceByItsOwnerWithItsLampAndGoneWhenItIsBack) {
+    run(310);
+    heard.clear();
+    value(table, "sensor.output.dropout") = 1;
     run(2000);
     const auto told = of(0x18FECA80);
     ASSERT_EQ(told.size(), 2U);
-    // amber lamp; SPN 0x7F123: low byte 23, then F1, then the top three bits with FMI 4; first occurrence
-    EXPECT_EQ(bytes(told[0]), "04FF23F1E401FFFF");
-    link.set_fault(0x7F123, 4, false);
-    run(3000);
-    ASSERT_EQ(of(0x18FECA80).size(), 3U);
-    EXPECT_EQ(bytes(of(0x18FECA80)[2]), "00FF00000000FFFF");
+    EXPECT_EQ(told[0].timestamp_ns, 310 * kMs);
+    EXPECT_EQ(told[1].timestamp_ns, 1310 * kMs);
+    // amber lamp; SPN 191 = 0xBF with FMI 5; first occurrence
+    EXPECT_EQ(bytes(told[0]), "04FFBF000501FFFF");
+    for (const auto& frame : of(0x18FECA00))
+        EXPECT_EQ(bytes(frame), "00FF00000000FFFF") << "not the engine's";
+
+    value(table, "sensor.output.dropout") = 0;
+    heard.clear();
+    run(1);
+    ASSERT_EQ(of(0x18FECA80).size(), 1U);
+    EXPECT_EQ(bytes(of(0x18FECA80)[0]), "00FF00000000FFFF");
 }
 
-TEST_F(SettledNetwork, SeveralFaultsTravelAsAnAnnouncedMessage) {
-    link.set_fault(100, 1, true);
-    link.set_fault(200, 2, true);
+TEST_F(SettledNetwork, AnSpnOfNineteenBitsKeepsItsUppermostThreeAboveTheFmi) {
+    value(table, "clutch.FR.valve_stuck") = 1;
+    run(1);
+    // SPN 520215 = 0x7F017: low byte 17, then F0, then 7 << 5 with FMI 7
+    ASSERT_EQ(of(0x18FECA80).size(), 1U);
+    EXPECT_EQ(bytes(of(0x18FECA80)[0]), "04FF17F0E701FFFF");
+}
+
+TEST_F(SettledNetwork, AFlickeringTroubleChangesAtMostOnceASecondAndEveryOccurrenceIsCounted) {
+    run(500);
+    heard.clear();
+    for (int i = 0; i < 200; ++i) {  // 10 ms on, 10 ms off
+        value(table, "engine.engine.stalled") = i % 2;
+        run(10);
+    }
+    const auto told = of(0x18FECA00);
+    ASSERT_LE(told.size(), 6U) << "in two seconds";
+    ASSERT_GE(told.size(), 2U);
+    EXPECT_EQ(bytes(told[0]), "10FFBE000101FFFF") << "red lamp, SPN 190, FMI 1";
+    std::vector<std::int64_t> changed;
+    for (std::size_t i = 0; i < told.size(); ++i)
+        if (i == 0 || told[i].data[0] != told[i - 1].data[0]) changed.push_back(told[i].timestamp_ns);
+    for (std::size_t i = 1; i < changed.size(); ++i) EXPECT_GE(changed[i] - changed[i - 1], 1000 * kMs);
+    ASSERT_EQ(link.troubles().size(), 1U);
+    EXPECT_EQ(link.troubles()[0].occurrences, 100U);
+    heard.clear();
+    value(table, "engine.engine.stalled") = 0;
+    run(1100);
+    EXPECT_EQ(bytes(of(0x18FECA00).back()), "00FF00000000FFFF") << "the last state is told in the end";
+}
+
+TEST_F(SettledNetwork, AHotClutchWarnsAndThenFailsAndColdOilIsSaidToo) {
+    const auto dm1 = [this] {
+        heard.clear();
+        run(1000);
+        return of(0x18FECA80).empty() ? "" : bytes(of(0x18FECA80).back());
+    };
+    value(table, "clutch.F3.temperature") = 210;
+    EXPECT_EQ(dm1(), "04FF0BF0F001FFFF") << "SPN 520203 FMI 16, amber";
+    value(table, "clutch.F3.temperature") = 260;
+    EXPECT_EQ(dm1(), "10FF0BF0E001FFFF") << "FMI 0 instead, red";
+    value(table, "clutch.F3.temperature") = 90;
+    value(table, "oil.temperature") = -10;
+    EXPECT_EQ(dm1(), "04FFB1001101FFFF") << "SPN 177 FMI 17";
+    value(table, "oil.temperature") = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(dm1(), "00FF00000000FFFF");
+}
+
+TEST_F(SettledNetwork, SeveralTroublesTravelAsAnAnnouncedMessageAndLightTheLampsOfAll) {
+    run(20);
+    heard.clear();
+    value(table, "sensor.input.stuck") = 1;
+    value(table, "clutch.F1.temperature") = 300;
     run(300);
     const auto announced = of(0x1CECFF80), packets = of(0x1CEBFF80);
     ASSERT_EQ(announced.size(), 1U);
+    EXPECT_EQ(announced[0].timestamp_ns, 20 * kMs) << "at once";
     EXPECT_EQ(bytes(announced[0]), "200A0002FFCAFE00");
     ASSERT_EQ(packets.size(), 2U);
     EXPECT_EQ(bytes(packets[0]),
-              "0104FF640001"
-              "01C8");
+              "0114FFA1000201"
+              "09");
     EXPECT_EQ(bytes(packets[1]),
-              "02000201"
+              "02F0E001"
               "FFFFFFFF");
     EXPECT_GE(packets[1].timestamp_ns - packets[0].timestamp_ns, 50 * kMs);
+    EXPECT_TRUE(of(0x18FECA80).empty());
+}
+
+// 45 codes of one node are 182 bytes, 26 packets, 1.3 s: longer than the cycle.
+TEST_F(SettledNetwork, AListLongerThanASecondCarriesIsToldWithoutPilingUpAndWithoutAllocation) {
+    for (int i = 0; i < table.size(); ++i) {
+        const auto& name = table.signal(i).name;
+        if (name.ends_with("stuck") || name.ends_with("dropout") || name.ends_with("missing_teeth") ||
+            name.ends_with(".leak"))
+            table.value[static_cast<std::size_t>(i)] = 1;
+        if (name.ends_with(".bias")) table.value[static_cast<std::size_t>(i)] = 100;
+    }
+    heard.reserve(100'000);
+    const CountAllocations allocations;
+    run(10'000);
+    EXPECT_EQ(allocations.count(), 0);
+    std::map<int, std::int64_t> last;  // announcements by source
+    for (const auto& frame : heard) {
+        if ((frame.id & 0xFFFFFF00U) != 0x1CECFF00U || frame.data[0] != 32) continue;
+        const int source = static_cast<int>(frame.id & 0xFFU), packets = frame.data[3];
+        EXPECT_TRUE(!last.contains(source) || frame.timestamp_ns - last[source] >= packets * 50 * kMs);
+        last[source] = frame.timestamp_ns;
+    }
+    EXPECT_EQ(last.size(), 3U) << "each of the three has its turn";
+    EXPECT_GE(last[0x80], 8000 * kMs) << "and is not forgotten";
+}
+
+TEST_F(SettledNetwork, AnAskerHearsTheTroublesOfTheOneHeAsks) {
+    value(table, "rig.safe_command") = 1;
+    run(10);
+    heard.clear();
+    say(0x18EA80F9, {0xCA, 0xFE, 0x00});
+    say(0x18EA05F9, {0xCA, 0xFE, 0x00});
+    run(3);
+    ASSERT_EQ(of(0x18FECA80).size(), 1U);
+    EXPECT_EQ(bytes(of(0x18FECA80)[0]), "04FFD3070901FFFF") << "SPN 2003 FMI 9";
+    ASSERT_EQ(of(0x18FECA05).size(), 1U);
+    EXPECT_EQ(bytes(of(0x18FECA05)[0]), "00FF00000000FFFF");
+}
+
+TEST(TroubleCodes, AConditionMustHoldAsLongAsItsCodeWants) {
+    Mapping mapping = tractor_mapping();
+    for (auto& code : mapping.troubles) code.after_ms = 50;
+    InProcessBus bus(2);
+    SignalTable table = rig_signals();
+    CanLink link(mapping, bus.end(0), table);
+    int now_ms = 0;
+    const auto run = [&](int ms) {
+        for (const int end = now_ms + ms; now_ms < end; ++now_ms) link.send(now_ms * kMs, table);
+    };
+    value(table, "sensor.output.stuck") = 1;
+    run(50);
+    value(table, "sensor.output.stuck") = 0;
+    run(10);
+    EXPECT_TRUE(link.troubles().empty()) << "49 ms are not enough";
+    value(table, "sensor.output.stuck") = 1;
+    run(51);
+    ASSERT_EQ(link.troubles().size(), 1U);
+    EXPECT_TRUE(link.troubles()[0].active);
+    EXPECT_EQ(link.troubles()[0].spn, 191U);
+    EXPECT_EQ(link.troubles()[0].fmi, 2U);
+    EXPECT_EQ(link.troubles()[0].node, "TransmissionSensors");
+}
+
+TEST_F(Network, TroublesWaitForTheAddressAndALostOneIsSilent) {
+    value(table, "sensor.output.dropout") = 1;
+    run(250);
+    EXPECT_TRUE(of(0x18FECA80).empty()) << "the sensors have no address yet";
+    run(20);
+    ASSERT_EQ(of(0x18FECA80).size(), 1U);
+    EXPECT_EQ(bytes(of(0x18FECA80)[0]), "04FFBF000501FFFF");
+    say_claim(0x80, 0);
+    heard.clear();
+    run(3000);
+    EXPECT_TRUE(of(0x18FECA80).empty());
+    EXPECT_EQ(of(0x18FECA00).size(), 3U);
 }
 
 TEST_F(SettledNetwork, ALongAnswerToOneAskerIsAConversation) {

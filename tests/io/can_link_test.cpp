@@ -137,8 +137,8 @@ TEST(CanLink, EveryMessageIsSentAtItsCycleTimeAndNoTickCarriesMoreThanTwo) {
         for (std::size_t i = 1; i < sent.size(); ++i) ASSERT_EQ(sent[i] - sent[i - 1], cycle) << message.name;
     }
     for (const auto& [time, count] : per_tick) ASSERT_LE(count, 2) << "at " << time;
-    // 10 messages every 10 ms, 1 every 20, 2 every 50, 5 every 100, 1 every second, at most 160 bits each.
-    EXPECT_NEAR(sides.rig_link.bus_load(), 1141 * 160 / 250e3, 1e-12);
+    // 10 messages every 10 ms, 1 every 20, 2 every 50, 5 every 100, 1 and three DM1 every second, at most 160 bits each.
+    EXPECT_NEAR(sides.rig_link.bus_load(), 1144 * 160 / 250e3, 1e-12);
     EXPECT_TRUE(sides.rig_link.warnings().empty());
 }
 
@@ -330,8 +330,7 @@ TEST(Trust, ASingleCommandMessageThatFallsSilentIsALoss) {
     ASSERT_TRUE(rig.rig_link.command_valid());
     // From now on command A alone.
     for (int ms = 500; ms < 700; ++ms) {
-        if (ms % 10 == 0)
-            rig.bus.end(2).send(ms * kMs, command_a(static_cast<unsigned>(ms / 10) & 15U, 500));
+        if (ms % 10 == 0) rig.bus.end(2).send(ms * kMs, command_a(static_cast<unsigned>(ms / 10) & 15U, 500));
         rig.tick(ms * kMs, false);
     }
     EXPECT_EQ(rig.rig_value("bus.ClutchCommandA.status"), 1);
@@ -473,6 +472,48 @@ TEST_F(Configuration, WhatIsWrongIsNamedWithItsPlace) {
     EXPECT_EQ(error_of("  Command: [\n"), "small.yaml:5:1: end of sequence flow not found");
 }
 
+TEST_F(Configuration, AWrongTroubleCodeIsNamedWithItsPlace) {
+    // Speeds of the rig as a J1939 message, so that it has an address.
+    std::ofstream(folder_ / "small.dbc") << "BU_: Tcu Rig Mute\nBO_ 2566844672 Speeds: 8 Rig\n SG_ Engine : "
+                                            "0|16@1+ (0.125,0) [0|8031.875] \"rpm\" Tcu\n";
+    const std::string messages = "  Speeds:\n    signals: {Engine: sensor.engine.speed}\n",
+                      head = messages + "trouble_codes:\n  - ";
+    EXPECT_EQ(error_of(head + "{spn: 190, of: Rig, lamp: amber, fmi: {5: sensor.engine.dropout}}\n"),
+              "accepted");
+    EXPECT_EQ(error_of(head + "{spn: 190, of: Tcu, lamp: amber, fmi: {5: sensor.engine.dropout}}\n"),
+              "small.yaml:7:20: trouble_codes: \"Tcu\" is none of the rig_nodes");
+    EXPECT_EQ(error_of(head + "{spn: 600000, of: Rig, lamp: amber, fmi: {5: sensor.engine.dropout}}\n"),
+              "small.yaml:7:11: 600000 must be 1…524287");
+    EXPECT_EQ(error_of(head + "{spn: 190, of: Rig, lamp: amber, fmi: {32: sensor.engine.dropout}}\n"),
+              "small.yaml:7:44: 32 must be 0…31");
+    EXPECT_EQ(error_of(head + "{spn: 190, of: Rig, lamp: blue, fmi: {5: sensor.engine.dropout}}\n"),
+              "small.yaml:7:31: lamp: \"blue\" is none of none, protect, amber, red, malfunction");
+    EXPECT_EQ(
+        error_of(head + "{spn: 190, of: Rig, lamp: amber, fmi: {5: sensor.engine.dropuot}}\n"),
+        "small.yaml:7:47: trouble code SPN 190 FMI 5: there is no signal \"sensor.engine.dropuot\"; nearest: "
+        "sensor.engine.dropout, sensor.engine.noise, sensor.engine.speed");
+    EXPECT_EQ(
+        error_of(head +
+                 "{spn: 177, of: Rig, lamp: amber, fmi: {17: {signal: oil.temperature, below: 5 rpm}}}\n"),
+        "small.yaml:7:48: trouble code SPN 177 FMI 17: oil.temperature is a temperature [°C], its limit is "
+        "an "
+        "angular speed [rad/s]");
+    EXPECT_EQ(
+        error_of(head + "{spn: 177, of: Rig, lamp: amber, fmi: {17: oil.temperature}}\n"),
+        "small.yaml:7:48: trouble code SPN 177 FMI 17: oil.temperature is a temperature [°C], its limit is a "
+        "plain number");
+    EXPECT_EQ(error_of(head + "{spn: 177, of: Rig, lamp: amber, fmi: {17: {signal: oil.temperature}}}\n"),
+              "small.yaml:7:48: trouble_codes: above or below is missing");
+    EXPECT_EQ(
+        error_of(
+            head +
+            "{spn: 190, of: Rig, lamp: amber, fmi: {5: sensor.engine.dropout, 5: sensor.engine.stuck}}\n"),
+        "small.yaml:7:70: trouble_codes: SPN 190 FMI 5 of Rig stands in line 7 already");
+    EXPECT_EQ(
+        error_of("trouble_codes:\n  - {spn: 190, of: Rig, lamp: amber, fmi: {5: sensor.engine.dropout}}\n"),
+        "small.yaml:5:44: trouble code SPN 190 FMI 5: Rig sends no J1939 message, so it has no address");
+}
+
 TEST_F(Configuration, ABusThatCannotCarryTheMessagesIsAWarningAtStart) {
     std::string messages = "  Speeds:\n    cycle_ms: 0.5\n    signals: {Engine: sensor.engine.speed}\n";
     InProcessBus bus(2);
@@ -494,7 +535,8 @@ TEST(CanLink, TheFirstFrameAfterACommandTellsWhenTheCommandArrived) {
     ASSERT_LT(count, seen.size());
     std::vector<std::int64_t> commands, answered;
     for (std::size_t i = 0; i < count; ++i) {
-        const bool command = seen[i].extended && (seen[i].id & 0x03FFFFFFU) == 0x00FF1003U;  // clutch command A
+        const bool command =
+            seen[i].extended && (seen[i].id & 0x03FFFFFFU) == 0x00FF1003U;  // clutch command A
         if (command) commands.push_back(seen[i].timestamp_ns);
         if (seen[i].answers_ns == 0) continue;
         EXPECT_EQ(seen[i].timestamp_ns - seen[i].answers_ns, kMs) << "taken in the tick after it was sent";

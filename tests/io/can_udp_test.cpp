@@ -1,5 +1,9 @@
 // CAN over UDP multicast as python-can speaks it. Runs in a network of its own (with_multicast.sh).
 #include <gtest/gtest.h>
+#include <linux/can.h>
+#include <linux/can/raw.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <array>
 #include <chrono>
@@ -141,9 +145,9 @@ TEST(UdpPort, TellsHowLongACommandWaitedForItsAnswer) {
         ASSERT_TRUE(rig->send(0, frame));
     };
     send(command[0].timestamp_ns);
-    send(0);                                                      // answers nothing
-    send(12'345);                                                 // a stamp of another clock
-    send(command[0].timestamp_ns + 1'000'000'000'000);            // and one of the future
+    send(0);                                            // answers nothing
+    send(12'345);                                       // a stamp of another clock
+    send(command[0].timestamp_ns + 1'000'000'000'000);  // and one of the future
     ASSERT_EQ(gather(*controller, 4).size(), 4U);
     std::int64_t latency = 0;
     ASSERT_TRUE(rig->next_command_latency(latency));
@@ -211,10 +215,15 @@ TEST(UdpPort, WhatIsNoFrameIsCountedAsMalformed) {
 }
 
 TEST(OpenPort, WhatCannotBeOpenedSaysWhyAndWhatToDoInOneLine) {
-    EXPECT_EQ(error_of("can:nosuch0"),
-              "can:nosuch0: there is no such interface; make a virtual one: sudo ip link add dev nosuch0 "
-              "type vcan && "
-              "sudo ip link set up nosuch0");
+    const int probe = ::socket(PF_CAN, SOCK_RAW, CAN_RAW);
+    EXPECT_EQ(
+        error_of("can:nosuch0"),
+        probe >= 0
+            ? "can:nosuch0: there is no such interface; make a virtual one: sudo ip link add dev nosuch0 "
+              "type vcan && sudo ip link set up nosuch0"
+            : "can:nosuch0: this kernel has no CAN (sudo modprobe can_raw); without it use "
+              "udpcan:239.74.163.2:43113");
+    if (probe >= 0) ::close(probe);
     EXPECT_EQ(error_of("can:"), "can:: the interface is missing, as in can:vcan0");
     EXPECT_EQ(error_of("can:can0?speed=1"),
               "can:can0?speed=1: unknown option \"speed=1\"; there is timestamps=hardware");

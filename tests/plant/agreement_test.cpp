@@ -188,6 +188,46 @@ TEST(RandomSystems, AFixedSubsetAgreesWithTheReferenceSolver) {
     EXPECT_GE(agreeing, 59);
 }
 
+TEST(RandomSystems, WithFreewheelsAgreeWithTheReferenceSolver) {
+    const ComparisonOptions options;
+    int agreeing = 0, compared = 0, freewheels = 0;
+    for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+        const RandomSystem system = random_system_with_freewheels(seed, options.seconds);
+        if (system.description.freewheels.empty()) continue;
+        freewheels += static_cast<int>(system.description.freewheels.size());
+        const Comparison c = compare(system, seed, options);
+        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
+        EXPECT_TRUE(c.outcome == Outcome::agrees || c.outcome == Outcome::sensitive)
+            << "seed " << seed << " " << name(c.outcome) << ": " << c.worst << " tolerances on "
+            << c.worst_signal << " at " << c.worst_time << " s\n"
+            << describe(system.description);
+        ++compared;
+        agreeing += c.outcome == Outcome::agrees;
+    }
+    EXPECT_GE(freewheels, 60);
+    EXPECT_GE(agreeing, compared - 2);
+}
+
+TEST(RandomSystems, WithBacklashesAgreeWithTheReferenceSolver) {
+    const ComparisonOptions options;
+    int agreeing = 0, compared = 0, backlashes = 0;
+    for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+        const RandomSystem system = random_system_with_backlashes(seed, options.seconds);
+        if (system.description.backlashes.empty()) continue;
+        backlashes += static_cast<int>(system.description.backlashes.size());
+        const Comparison c = compare(system, seed, options);
+        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
+        EXPECT_TRUE(c.outcome == Outcome::agrees || c.outcome == Outcome::sensitive)
+            << "seed " << seed << " " << name(c.outcome) << ": " << c.worst << " tolerances on "
+            << c.worst_signal << " at " << c.worst_time << " s\n"
+            << describe(system.description);
+        ++compared;
+        agreeing += c.outcome == Outcome::agrees;
+    }
+    EXPECT_GE(backlashes, 40);
+    EXPECT_GE(agreeing, compared - 3);
+}
+
 TEST(RandomSystems, AreTheSameForTheSameSeed) {
     for (std::uint64_t seed = 1; seed <= 20; ++seed)
         EXPECT_EQ(describe(random_system(seed, 0.2).description),

@@ -14,6 +14,7 @@ struct ComparisonOptions {
     int steps_per_sample = 1;    // plant steps per millisecond
     double tolerance = 1e-4;     // of a signal's range
     double range_floor = 1e-3;   // a range counts as at least this share of the largest of its unit
+    double rounding = 1e-9;      // of the largest value of a unit: no solution of a linear system is better
     double perturbation = 1e-9;  // relative, on speeds, capacities and torques
     double event_clearance =
         2e-5;  // torques jump with contact states: samples nearer to a change are left out [s]
@@ -22,6 +23,7 @@ struct ComparisonOptions {
 enum class Outcome {
     agrees,
     sensitive,         // the reference itself moves more than the tolerance under the perturbation
+    ambiguous,         // the reference itself depends on how devices at rest are assumed to share their load
     reference_failed,  // no consistent mode, or chatter without end: nothing to compare with
     disagrees,
     broken,  // an invariant of the plant does not hold: not finite, constraint, momentum, ledger, determinism
@@ -49,7 +51,8 @@ struct Deviation {
 Deviation deviation(const plant::Description& description, const reference::Result& truth,
                     const reference::Result& other, const ComparisonOptions& options);
 
-reference::Result run_reference(const plant::Description& description, const ComparisonOptions& options);
+reference::Result run_reference(const plant::Description& description, const ComparisonOptions& options,
+                                reference::Sharing sharing = reference::Sharing::free);
 plant::Description perturbed(plant::Description description, double relative, std::uint64_t seed);
 
 Comparison compare(const RandomSystem& system, std::uint64_t seed, const ComparisonOptions& options);

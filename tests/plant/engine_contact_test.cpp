@@ -4,6 +4,8 @@
 namespace shiftrig::plant {
 namespace {
 
+constexpr double pi = 3.14159265358979323846;
+
 Mass body(const std::string& name, double inertia, double speed = 0) {
     return {name, inertia, Motion::translating, speed};
 }
@@ -81,26 +83,84 @@ TEST(Clutch, BreaksAwayWhereItsInternalTorquePassesTheStaticCapacity) {
 
 // A load on a belt: m = k = 1, belt 0.2 m/s, static 1, sliding 0.7; seen from the belt the wall moves.
 TEST(Clutch, StickSlipHasThePeriodOfTheClosedForm) {
-    for (const double h : {1e-3, 5e-3, 20e-3}) {
+    // Slips for 2π − 2 atan 1.5, sticks while the belt carries the load from −0.3 to 0.3 m past the centre.
+    const double slip_time = 2 * pi - 2 * std::atan(1.5), period = slip_time + 3;
+    for (const Method method : {Method::etd3, Method::ark3}) {
+        for (const double h : {1e-3, 5e-3, 20e-3}) {
+            Description d;
+            d.name = "stick-slip";
+            d.method = method;
+            d.masses = {body("load", 1), body("wall", 1e12, -0.2)};
+            d.clutches = {clutch("belt", "load", "", 0.7, 1 / 0.7)};
+            d.shafts = {{"spring", "load", "wall", 1, 0, 0}};
+            Rig rig(d, {h, KernelKind::automatic});
+            double furthest = 0;
+            while (rig.state.time() < 60) {
+                rig.step();
+                furthest = std::max(furthest, std::fabs(rig.out("shaft.spring.twist")));
+            }
+            const auto slips = rig.times(EventKind::break_away, "belt"),
+                       sticks = rig.times(EventKind::lock, "belt");
+            ASSERT_GE(slips.size(), 7u);
+            // The prototype, exact between events as ETD3 is, reached 1.4e-7 s. ARK3 damps a swing of hω by the ratio
+            // 2e-5 (hω/0.084)³; of 0.36 m that takes ζ·slip_time, and the belt brings 0.2 m/s.
+            const double damped = method == Method::ark3 ? 2e-5 * std::pow(h / 0.084, 3) * slip_time * 0.36 / 0.2 : 0;
+            const double bound = 3 * 1.4e-7 + damped;
+            for (std::size_t i = 2; i < slips.size(); ++i) {
+                EXPECT_NEAR(slips[i] - slips[i - 1], period, bound) << "h = " << h;
+            }
+            const std::size_t first = sticks[0] > slips[0] ? 0 : 1;
+            EXPECT_NEAR(sticks[first] - slips[0], slip_time, bound) << "h = " << h;
+            EXPECT_NEAR(furthest, 1.060555, 1e-4);
+        }
+    }
+}
+
+// v̇ = −14 + 2·10⁴ t from 4.5 mm/s against 4 Nm: zero at 0.5 ms, where the load has just vanished. It stays until the
+// load is 4 Nm at 0.7 ms and has 0.9 mrad/s at 1 ms; passing through zero and back unseen it would have 0.5.
+TEST(Clutch, SlipThatTouchesZeroWithinAStepLocks) {
+    for (const int parts : {1, 16}) {
         Description d;
-        d.name = "stick-slip";
-        d.masses = {body("load", 1), body("wall", 1e12, -0.2)};
-        d.clutches = {clutch("belt", "load", "", 0.7, 1 / 0.7)};
-        d.shafts = {{"spring", "load", "wall", 1, 0, 0}};
-        Rig rig(d, {h, KernelKind::automatic});
-        double furthest = 0;
-        while (rig.state.time() < 60) {
-            rig.step();
-            furthest = std::max(furthest, std::fabs(rig.out("shaft.spring.twist")));
-        }
-        const auto slips = rig.times(EventKind::break_away, "belt"), sticks = rig.times(EventKind::lock, "belt");
-        ASSERT_GE(slips.size(), 7u);
-        for (std::size_t i = 2; i < slips.size(); ++i) {
-            EXPECT_NEAR(slips[i] - slips[i - 1], 7.317598, 5e-6) << "h = " << h;
-        }
-        const std::size_t first = sticks[0] > slips[0] ? 0 : 1;
-        EXPECT_NEAR(sticks[first] - slips[0], 4.317598, 5e-6);
-        EXPECT_NEAR(furthest, 1.060555, 1e-4);
+        d.name = "touch";
+        d.maximum_parts = parts;
+        d.masses = {mass("load", 1, 4.5e-3)};
+        d.clutches = {clutch("brake", "load", "", 4)};
+        Waveform ramp = constant(-10);
+        ramp.pieces[0].from = 0;
+        ramp.pieces[0].slope = 2e4;
+        d.sources = {source("load", ramp)};
+        Rig rig(d);
+        rig.step();
+        const auto locks = rig.times(EventKind::lock, "brake"), goes = rig.times(EventKind::break_away, "brake");
+        ASSERT_EQ(locks.size(), 1u);
+        ASSERT_EQ(goes.size(), 1u);
+        EXPECT_NEAR(locks[0], 5e-4, 1e-9);
+        EXPECT_NEAR(goes[0], 7e-4, 1e-9);
+        EXPECT_NEAR(rig.state.speeds()[0], 9e-4, 1e-8);
+        EXPECT_EQ(rig.fall_backs, 0);
+    }
+}
+
+// A torque wave of 4.2 Nm whose top alone is above 4 Nm, and which is 3.6 Nm at both ends of the step.
+TEST(Clutch, TorqueThatIsTooMuchOnlyWithinAStepBreaksItLoose) {
+    const double omega = 2 * (0.5 * pi - std::asin(3.6 / 4.2)) / 1e-3, lead = std::acos(4 / 4.2);
+    for (const int parts : {1, 16}) {
+        Description d;
+        d.name = "peak";
+        d.maximum_parts = parts;
+        d.masses = {mass("load", 1)};
+        d.clutches = {clutch("brake", "load", "", 4)};
+        d.clutches[0].initially_locked = true;
+        d.sources = {source("load", sine(4.2, omega / (2 * pi), -1e300, 1e300, -std::asin(3.6 / 4.2) / omega))};
+        Rig rig(d);
+        rig.step();
+        const auto goes = rig.times(EventKind::break_away, "brake");
+        ASSERT_EQ(goes.size(), 1u);
+        EXPECT_NEAR(goes[0], 5e-4 - lead / omega, 1e-6);
+        // ∫(4.2 cos ω(t − 0.5 ms) − 4) dt from there to the end of the step
+        const double half = omega * 5e-4;
+        const double speed = (4.2 * (std::sin(half) + std::sin(lead)) - 4 * (half + lead)) / omega;
+        EXPECT_NEAR(rig.state.speeds()[0], speed, 1e-2 * speed);
     }
 }
 

@@ -55,6 +55,7 @@ Description lossy_gear() {
 struct Comparison {
     std::string signal, column;
     double sign = 1;
+    std::string minus = {};  // signal to be taken off
     double worst = 0;
 };
 
@@ -66,7 +67,8 @@ void compare(Rig& rig, const std::string& file, double h, std::vector<Comparison
     for (std::size_t row = every; row < rows; row += every) {
         rig.step();
         for (Comparison& c : comparisons) {
-            const double error = std::fabs(c.sign * rig.out(c.signal) - reference.at(c.column)[row]);
+            const double value = rig.out(c.signal) - (c.minus.empty() ? 0 : rig.out(c.minus));
+            const double error = std::fabs(c.sign * value - reference.at(c.column)[row]);
             c.worst = std::max(c.worst, error);
         }
     }
@@ -125,20 +127,103 @@ TEST_P(BothEngines, FrictionFollowsTheReference) {
     Rig rig(with(friction(), GetParam().method), {GetParam().h, KernelKind::automatic});
     std::vector<Comparison> c = {{"mass.J3.speed", "inertia3.w"},
                                  {"clutch.clutch.slip", "clutch.w_rel", -1},
-                                 {"shaft.spring.twist", "spring.phi_rel", -1}};
+                                 {"shaft.spring.twist", "spring.phi_rel", -1},
+                                 {"mass.J2.speed", "spring.w_rel", -1, "mass.J1.speed"}};
     compare(rig, "Friction.csv", GetParam().h, c);
-    // ARK3 is not exact in the spring: at 2 ms its order allows eight times what it reaches at 1 ms.
-    const double looser = GetParam().method == Method::ark3 && GetParam().h > 1.5e-3 ? 8 : 1;
-    EXPECT_LT(c[0].worst, looser * 4e-4);  // the reference's own agreement
-    EXPECT_LT(c[1].worst, looser * 4e-4);
-    EXPECT_LT(c[2].worst, looser * 3 * 1e-5);
+    EXPECT_LT(c[0].worst, 4e-4);  // the reference's own agreement
+    // ARK3 is not exact in the spring: what it reaches at 1 ms (2.6e-4 rad/s) grows with the cube of the step.
+    const bool truncated = GetParam().method == Method::ark3 && GetParam().h > 1.5e-3;
+    EXPECT_LT(c[1].worst, truncated ? 8 * 2.8e-4 : 4e-4);
+    EXPECT_LT(c[2].worst, truncated ? 4e-5 : 3 * 1e-5);
+    EXPECT_LT(c[3].worst, truncated ? 8 * 2.6e-4 : 4e-4);
     EXPECT_EQ(rig.fall_backs, 0);
 }
 
-// Releases act at the start of a step, so the bounds are for 1 ms.
+// … and that is all of it: against the engine that is exact there, ARK3 keeps its third order across lock and break-away.
+TEST(Ark3, DiffersInTheFrictionProblemByItsOwnOrder) {
+    const auto difference = [](double h) {
+        Rig exact(with(friction(), Method::etd3), {h, KernelKind::automatic}),
+            tree(with(friction(), Method::ark3), {h, KernelKind::automatic});
+        double worst = 0;
+        while (exact.state.time() < 1 - 1e-9) {
+            exact.step();
+            tree.step();
+            worst = std::max(worst, std::fabs(exact.out("clutch.clutch.slip") - tree.out("clutch.clutch.slip")));
+        }
+        return worst;
+    };
+    const double coarse = difference(2e-3), fine = difference(5e-4);
+    EXPECT_GT(std::log2(coarse / fine) / 2, 2.5) << coarse << " → " << fine;
+    EXPECT_LT(std::log2(coarse / fine) / 2, 3.5) << coarse << " → " << fine;
+}
+
 class EachEngine : public ::testing::TestWithParam<Method> {};
 INSTANTIATE_TEST_SUITE_P(Methods, EachEngine, ::testing::Values(Method::etd3, Method::ark3));
 
+// The article's rule acts from the next step on: the figures are those of the same prototype without localisation.
+TEST(NextStepRule, HasTheErrorsKnownOfIt) {
+    Description clutches = coupled_clutches(), brake = friction();
+    for (Description* d : {&clutches, &brake}) d->transition = Transition::next_step;
+    Rig coupled(clutches), braked(brake);
+    std::vector<Comparison> c = {{"mass.J1.speed", "J1.w"}, {"clutch.clutch1.slip", "clutch1.w_rel", -1}},
+                            f = {{"clutch.clutch.slip", "clutch.w_rel", -1}};
+    compare(coupled, "CoupledClutches.csv", 1e-3, c);
+    compare(braked, "Friction.csv", 1e-3, f);
+    EXPECT_LT(c[0].worst, 3 * 4.8e-4);
+    EXPECT_LT(c[1].worst, 3 * 7.5e-4);
+    EXPECT_LT(f[0].worst, 3 * 2.0e-2);
+    EXPECT_GT(c[0].worst, 4.8e-4 / 3) << "is it localised after all?";
+    EXPECT_GT(f[0].worst, 2.0e-2 / 3);
+}
+
+// A diesel is let run up through every corner of its full-load curve and onto the governor line. Corners are not located:
+// each costs O(h²) once.
+TEST_P(EachEngine, CornersOfTheEngineCurveAreHarmless) {
+    Description d;
+    d.name = "run-up";
+    d.method = GetParam();
+    d.masses = {mass("engine", 2.6, 75), mass("rotor", 0.5, 75)};
+    d.shafts = {{"shaft", "engine", "rotor", 5000, 20, 0}};
+    Engine engine;
+    engine.name = "diesel";
+    engine.mass = "engine";
+    engine.full_load = {{73, 550}, {89, 700}, {105, 880}, {126, 1060}, {147, 1170}, {168, 1201}, {188, 1144}, {210, 972}, {220, 858}, {226, 729}};
+    engine.governor_slope = 187;
+    engine.low_idle = 94;
+    engine.high_idle = 229;
+    engine.friction_constant = 70;
+    engine.friction_per_speed = 0.45;
+    engine.actuator_lag = 0.04;
+    engine.turbo_instant_fraction = 0.62;
+    engine.turbo_lag = 0.5;
+    engine.fade_from = 70;
+    engine.fade_to = 50;
+    engine.stall_speed = 40;
+    d.engines = {engine};
+    const auto trace = [&](int steps_per_millisecond) {
+        Rig rig(d, {1e-3 / steps_per_millisecond, KernelKind::automatic});
+        rig.in("driver.throttle") = 1;
+        std::vector<double> speeds;
+        for (int k = 0; k < 1500; ++k) {
+            for (int i = 0; i < steps_per_millisecond; ++i) rig.step();
+            speeds.push_back(rig.state.speeds()[0]);
+        }
+        return speeds;
+    };
+    const auto exact = trace(32);
+    EXPECT_GT(exact.back(), 226) << "it reached the governor line";
+    const auto worst = [&](const std::vector<double>& speeds) {
+        double most = 0;
+        for (std::size_t k = 0; k < speeds.size(); ++k) most = std::max(most, std::fabs(speeds[k] - exact[k]));
+        return most;
+    };
+    const double coarse = worst(trace(1)), fine = worst(trace(4));
+    // Reached: 9e-8 (ETD3) and 2e-6 (ARK3) of what the speed passes through.
+    EXPECT_LT(coarse, 5e-6 * 150);
+    EXPECT_LT(fine, coarse);
+}
+
+// Releases act at the start of a step, so the bounds are for 1 ms.
 TEST_P(EachEngine, LossyGearSticksAndReleasesAsTheReference) {
     Rig rig(with(lossy_gear(), GetParam()));
     std::vector<Comparison> c = {{"mass.J2.speed", "Inertia2.w"}};

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/hydraulics.h"
 #include "plant/laws/lag.h"
@@ -151,6 +152,31 @@ TEST(Valve, CommandIsLimitedToTheSupply) {
     EXPECT_NEAR(rig.state.valve, 18 * bar, 1e-3);
     for (int n = 0; n < 1000; ++n) rig.step(-5 * bar);
     EXPECT_NEAR(rig.state.valve, 0, 1e-3);
+}
+
+// Dropped from full pressure, r falls at the slew rate s, p lags by 2ζs/ω and swings through: ṗ is the step response
+// −s(1 − …), and where it vanishes p = −(s/ω) exp(−ζ(π − acos ζ)/√(1 − ζ²)). The gauge shows 0.09 bar of suction; above
+// absolute zero that is possible, and neither plates nor piston feel it.
+TEST(Valve, SuctionAfterADropIsThatOfTheClosedFormAndMovesNothing) {
+    Rig rig(reference_valve(true), 1e-3, {}, 18 * bar);
+    double least = 0;
+    for (int n = 0; n < 500; ++n) {
+        const HydraulicStep step = rig.step(0);
+        for (const double p : {step.valve.middle, step.valve.end}) least = std::min(least, p);
+        if (step.valve.begin < 0.8 * bar && step.valve.end < 0.8 * bar) {
+            EXPECT_EQ(balanced_stroke(rig.p, p_return, step.valve.end), 0);
+            EXPECT_LT(step.chamber(0.5), p_return) << "the plates are apart";
+        }
+    }
+    const double zeta = 0.8;
+    const double closed = -150 * bar / 60 * std::exp(-zeta * (std::acos(-1.0) - std::acos(zeta)) / std::sqrt(1 - zeta * zeta));
+    EXPECT_NEAR(least, closed, 1e-2 * std::fabs(closed));  // the lag has been there for 7.2/ω
+    EXPECT_GT(least, -0.1 * bar);
+    FrictionLaw law;
+    law.return_pressure = p_return;
+    law.load_per_pascal = 1e-3;
+    EXPECT_EQ(load_from_pressure(law, least), 0);
+    EXPECT_NEAR(rig.state.valve, 0, 0.1) << "and it goes away";
 }
 
 // Filling ------------------------------------------------------------------------------------------------

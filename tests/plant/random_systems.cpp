@@ -360,6 +360,51 @@ RandomSystem random_system(std::uint64_t seed, double seconds) {
     return Builder(seed, seconds).build();
 }
 
+RandomSystem random_system_with_freewheels(std::uint64_t seed, double seconds) {
+    RandomSystem system = random_system(seed, seconds);
+    Dice dice(seed + 0x5eed);
+    std::vector<Clutch> kept;
+    for (const Clutch& c : system.description.clutches) {
+        if (!dice.chance(0.6)) {
+            kept.push_back(c);
+            continue;
+        }
+        const double capacity = std::get<DryFriction>(c.friction).sliding_capacity;
+        Freewheel f{.name = c.name, .a = c.a, .b = c.b};
+        f.blocks = dice.chance(0.5) ? Sense::forward : Sense::backward;
+        f.rated_torque = capacity * (dice.chance(0.3) ? 1 : 20);
+        f.sliding_share = dice.chance(0.5) ? 1 : dice.uniform(0.6, 1);
+        f.drag_torque = dice.chance(0.5) ? 0 : capacity * dice.logarithmic(1e-3, 0.1);
+        system.description.freewheels.push_back(f);
+    }
+    system.description.clutches = kept;
+    return system;
+}
+
+RandomSystem random_system_with_backlashes(std::uint64_t seed, double seconds) {
+    RandomSystem system = random_system(seed, seconds);
+    Dice dice(seed + 0x9a9);
+    std::vector<Shaft> kept;
+    double torque = 0;
+    for (const TorqueSource& source : system.description.sources)
+        torque = std::max(torque, std::abs(source.waveform.pieces[0].offset));
+    for (const Shaft& shaft : system.description.shafts) {
+        if (!dice.chance(0.7)) {
+            kept.push_back(shaft);
+            continue;
+        }
+        const double twist = torque / shaft.stiffness;  // that the machine's own torque gives
+        Backlash b{.name = shaft.name, .a = shaft.a, .b = shaft.b};
+        b.stiffness = shaft.stiffness;
+        b.damping = dice.chance(0.3) ? 0 : shaft.damping;
+        b.gap = twist * dice.logarithmic(0.03, 3);
+        b.initial_twist = shaft.initial_twist;
+        system.description.backlashes.push_back(b);
+    }
+    system.description.shafts = kept;
+    return system;
+}
+
 double impulse(const Waveform& waveform, double until) {
     double sum = 0;
     for (const auto& p : waveform.pieces) {

@@ -20,6 +20,12 @@ struct RandomSystem {
 // The same seed gives the same system on every machine.
 RandomSystem random_system(std::uint64_t seed, double seconds);
 
+// The same machines with some of their clutches replaced by freewheels.
+RandomSystem random_system_with_freewheels(std::uint64_t seed, double seconds);
+
+// The same machines with play in some of their shafts.
+RandomSystem random_system_with_backlashes(std::uint64_t seed, double seconds);
+
 // ∫ waveform dt from 0 to `until`.
 double impulse(const plant::Waveform& waveform, double until);
 

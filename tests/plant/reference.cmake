@@ -1,6 +1,6 @@
 # The independent solver, its own proof, and what it proves about the plant.
 add_library(shiftrig_reference STATIC plant/reference/system.cpp plant/reference/modes.cpp plant/reference/solver.cpp
-            plant/reference/cases.cpp plant/reference/curves.cpp plant/reference/tractor.cpp)
+            plant/reference/linear_program.cpp plant/reference/cases.cpp plant/reference/curves.cpp plant/reference/tractor.cpp)
 target_link_libraries(shiftrig_reference PUBLIC shiftrig_options Eigen3::Eigen)
 
 add_executable(reference_solver_test plant/reference/solver_test.cpp)

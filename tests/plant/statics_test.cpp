@@ -285,7 +285,7 @@ std::string error_of(const Description& d, const StaticsProblem& p) {
 TEST(StaticsErrors, NameWhatIsWrong) {
     const Description d = machines::wt_gearbox();
     EXPECT_EQ(error_of(d, problem({"C1", "C9"}, "input", 1)),
-              "model \"wt_gearbox\": closed = \"C9\" is no clutch or brake");
+              "model \"wt_gearbox\": closed = \"C9\" is no clutch, brake or freewheel");
     EXPECT_EQ(error_of(d, problem({"C1", "C3"}, "inlet", 1)),
               "statics \"wt_gearbox\": input = \"inlet\" is no mass of the model");
     EXPECT_EQ(

@@ -108,6 +108,55 @@ Response Responses::build(const Mode& mode) const {
         if (row.friction >= 0) response.friction_torque.row(row.friction) = torque;
         if (row.loss >= 0) response.loss_torque.row(row.loss) = torque;
     }
+    if (!response.sound) {
+        Eigen::JacobiSVD<Matrix> svd(c_hat, Eigen::ComputeFullV);
+        svd.setThreshold(1e-11);
+        Matrix free = svd.matrixV().rightCols(r - svd.rank());
+        if (sharing_ == Sharing::by_loss) {
+            Vector share_cost = cost.tail(r);
+            Matrix losses = free;
+            for (int i = 0; i < r; ++i) {
+                const bool loss = rows[static_cast<std::size_t>(i)].loss >= 0;
+                if (loss) share_cost[i] = 0;
+                if (!loss) losses.row(i).setZero();
+            }
+            Eigen::JacobiSVD<Matrix> of_losses(losses, Eigen::ComputeFullV);
+            of_losses.setThreshold(1e-9);
+            const auto rank = of_losses.rank();
+            const Matrix kept = free * of_losses.matrixV().rightCols(free.cols() - rank);  // changes no loss
+            const Matrix weighted = share_cost.asDiagonal() * kept;
+            const auto cheapest = [&](const Matrix& torques) -> Matrix {
+                if (kept.cols() == 0) return torques;
+                return torques - kept * weighted.completeOrthogonalDecomposition().solve(
+                                            Matrix(share_cost.asDiagonal() * torques));
+            };
+            free = cheapest(free * of_losses.matrixV().leftCols(rank));
+            const Matrix start = cheapest(x.bottomRows(r));
+            for (int i = 0; i < r; ++i) {
+                const Row& row = rows[static_cast<std::size_t>(i)];
+                const auto torque = start.row(i) / norm[i];
+                if (row.mesh >= 0) response.mesh_torque.row(row.mesh) = torque;
+                if (row.friction >= 0) response.friction_torque.row(row.friction) = torque;
+            }
+        }
+        response.mesh_freedom = Matrix::Zero(meshes, free.cols());
+        response.loss_freedom = Matrix::Zero(meshes, free.cols());
+        response.friction_freedom = Matrix::Zero(frictions, free.cols());
+        for (int i = 0; i < r; ++i) {
+            const Row& row = rows[static_cast<std::size_t>(i)];
+            const auto torque = free.row(i) / norm[i];
+            if (row.mesh >= 0) response.mesh_freedom.row(row.mesh) = torque;
+            if (row.friction >= 0) response.friction_freedom.row(row.friction) = torque;
+            if (row.loss >= 0) response.loss_freedom.row(row.loss) = torque;
+        }
+        // Losses of meshes that move follow their torques.
+        for (int m = 0; m < meshes; ++m) {
+            const auto index = static_cast<std::size_t>(m);
+            const auto& mesh = system_.meshes[index];
+            if (mesh.lossy() && mode.mesh[index] != Hold::held)
+                response.loss_freedom.row(m) = mesh.slope(mode.x[index]) * response.mesh_freedom.row(m);
+        }
+    }
     for (int m = 0; m < meshes; ++m) {
         const auto index = static_cast<std::size_t>(m);
         const auto& mesh = system_.meshes[index];

@@ -23,6 +23,7 @@ struct Mode {
     std::vector<Hold> mesh;      // sign of the relative motion, or held (lossless meshes: always plus)
     std::vector<int> x;          // loss direction of each mesh
     std::vector<bool> at_rest;   // mesh whose relative speed is exactly 0, whatever its loss torque does
+    std::vector<int> flank;      // closed flank of each shaft with play, 0: none
     auto operator<=>(const Mode&) const = default;
 };
 
@@ -36,16 +37,26 @@ struct Response {
     int redundancy = 0;      // dependent rows among meshes and held friction devices
     bool sound =
         true;  // held meshes are independent of everything else that is held: their loss torque is unique
+    // Where not: changes of the torques that no mass feels, one a column.
+    Matrix mesh_freedom, loss_freedom, friction_freedom;
+};
+
+// Where mechanics does not determine how devices at rest share a load, it is assumed to be shared in the way that
+// spares the fullest of them.
+enum class Sharing : std::int8_t {
+    free,     // by any split that no mass feels
+    by_loss,  // by the losses of meshes at rest alone; friction devices share in proportion to what they can carry
 };
 
 class Responses {
   public:
-    explicit Responses(const System& system) : system_(system) {}
+    Responses(const System& system, Sharing sharing) : system_(system), sharing_(sharing) {}
     const Response& of(const Mode& mode);
 
   private:
     Response build(const Mode& mode) const;
     const System& system_;
+    Sharing sharing_;
     std::map<std::vector<int>, Response> cache_;
     Mode last_mode_;
     const Response* last_ = nullptr;

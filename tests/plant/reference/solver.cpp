@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/plant/reference/linear_program.h"
+
 namespace shiftrig::reference {
 namespace {
 
@@ -18,7 +20,8 @@ Hold toward(double value) {
 
 }  // namespace
 
-Solver::Solver(const System& system) : z(system.start), system_(system), responses_(system) {
+Solver::Solver(const System& system, Sharing sharing)
+    : z(system.start), system_(system), responses_(system, sharing) {
     if (z.size() < system.size()) z.conservativeResizeLike(Vector::Zero(system.size()));
     for (const auto& friction : system.frictions)
         mode.friction.push_back(friction.initially_held ? Hold::held : Hold::free);
@@ -28,8 +31,16 @@ Solver::Solver(const System& system) : z(system.start), system_(system), respons
         mode.x.push_back(1);
         mode.at_rest.push_back(mesh.lossy() && w == 0);
     }
+    for (const auto& play : system.plays) mode.flank.push_back(play.pressed(twist(play, z), rate(play, z)));
     force_ = Vector::Zero(system.masses);
     extra_ = Vector::Zero(system.extras);
+}
+
+double Solver::twist(const System::Play& play, const Vector& state) const {
+    return state[system_.masses + play.shaft];
+}
+double Solver::rate(const System::Play& play, const Vector& state) const {
+    return system_.shaft_columns.col(play.shaft).dot(state.head(system_.masses));
 }
 
 double Solver::speed_scale(const Vector& state) const {
@@ -44,12 +55,17 @@ void Solver::note(double time, const std::string& device, const char* what) {
 
 void Solver::free_torque(When when, const Vector& state, const Mode& trial, Vector& out) {
     system_.force(when, state, out, extra_);
+    for (std::size_t p = 0; p < system_.plays.size(); ++p) {
+        const auto& play = system_.plays[p];
+        out -= system_.shaft_columns.col(play.shaft) *
+               play.torque(trial.flank[p], twist(play, state), rate(play, state));
+    }
     for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
         const double s = sign_of(trial.friction[f]);
         if (s == 0) continue;
         const auto& friction = system_.frictions[f];
         const double slip = friction.column.dot(state.head(system_.masses));
-        out -= friction.column * (s * friction.sliding(when, state, slip));
+        out -= friction.column * (s * friction.slides(when, state, slip, s));
     }
     for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
         const auto& mesh = system_.meshes[m];
@@ -65,6 +81,65 @@ void Solver::solve(When when, const Vector& state, const Mode& trial, Torques& o
     out.mesh = response.mesh_torque * out.free;
     out.loss = response.loss_torque * out.free;
     out.friction = response.friction_torque * out.free;
+    if (response.friction_freedom.cols() > 0) share(when, state, trial, response, out);
+}
+
+void Solver::share(When when, const Vector& state, const Mode& trial, const Response& response, Torques& out) {
+    // Unknowns: the use u of capacities, and how much of each change, forwards and backwards. The limits of a mesh at
+    // rest, −f(−M) ≤ L ≤ f(M), f the larger of two lines, are one linear program for each choice of lines.
+    const Eigen::Index ways = response.friction_freedom.cols(), unknowns = 1 + 2 * ways;
+    std::vector<std::size_t> held_meshes, held_frictions;
+    for (std::size_t m = 0; m < system_.meshes.size(); ++m)
+        if (system_.meshes[m].lossy() && trial.mesh[m] == Hold::held) held_meshes.push_back(m);
+    for (std::size_t f = 0; f < system_.frictions.size(); ++f)
+        if (trial.friction[f] == Hold::held) held_frictions.push_back(f);
+    const double scale = out.free.lpNorm<Eigen::Infinity>() + 1e-6;
+    const auto rows = static_cast<Eigen::Index>(2 * held_frictions.size() + 2 * held_meshes.size());
+    Matrix a = Matrix::Zero(rows, unknowns);
+    Vector b(rows), cost = Vector::Zero(unknowns), x;
+    cost[0] = 1;
+    Eigen::Index row = 0;
+    const auto limit = [&](const Eigen::RowVectorXd& change, double use, double room) {
+        a.row(row).setZero();
+        a(row, 0) = -use / scale;
+        a.row(row).segment(1, ways) = change;
+        a.row(row).segment(1 + ways, ways) = -change;
+        b[row++] = room / scale;
+    };
+    for (const std::size_t f : held_frictions) {
+        const auto k = static_cast<Eigen::Index>(f);
+        const double holding = system_.frictions[f].holding(when, state);
+        limit(response.friction_freedom.row(k), holding, -out.friction[k]);
+        limit(-response.friction_freedom.row(k), holding, out.friction[k]);
+    }
+    const Eigen::Index first_mesh_row = row;
+    const int branches = 1 << (2 * held_meshes.size());
+    double best = std::numeric_limits<double>::infinity();
+    Vector best_change;
+    int& last = branch_[&response];
+    for (int i = 0; i < branches && best > 1; ++i) {
+        const int branch = i == 0 ? last : i - (i <= last);
+        row = first_mesh_row;
+        for (std::size_t j = 0; j < held_meshes.size(); ++j) {
+            const auto& mesh = system_.meshes[held_meshes[j]];
+            const auto k = static_cast<Eigen::Index>(held_meshes[j]);
+            const int above = (branch >> (2 * j)) & 1 ? -1 : 1, below = (branch >> (2 * j + 1)) & 1 ? -1 : 1;
+            const double rise = mesh.slope(above), fall = mesh.slope(below);
+            limit(response.loss_freedom.row(k) - rise * response.mesh_freedom.row(k), 0,
+                  rise * out.mesh[k] + mesh.offset(above) - out.loss[k]);
+            limit(-response.loss_freedom.row(k) + fall * response.mesh_freedom.row(k), 0,
+                  out.loss[k] - fall * out.mesh[k] + mesh.offset(below));
+        }
+        if (!linear_program(a, b, cost, x) || x[0] >= best) continue;
+        best = x[0];
+        best_change = x.segment(1, ways) - x.segment(1 + ways, ways);
+        last = branch;
+    }
+    if (best_change.size() == 0) return;
+    best_change *= scale;
+    out.mesh += response.mesh_freedom * best_change;
+    out.loss += response.loss_freedom * best_change;
+    out.friction += response.friction_freedom * best_change;
 }
 
 void Solver::rates(When when, const Vector& state, Vector& dz) {
@@ -112,8 +187,13 @@ double Solver::worst_overload(When when, const Torques& torques, const Mode& tri
     double worst = 0;
     for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
         if (trial.friction[f] != Hold::held) continue;
-        const double ratio = std::abs(torques.friction[static_cast<Eigen::Index>(f)]) /
-                             std::max(system_.frictions[f].holding(when, z), 1e-300);
+        const double torque = torques.friction[static_cast<Eigen::Index>(f)];
+        // A freewheel without drag lets go at any torque of the wrong sign, but not at rounding.
+        const double least = 1e-9 * (torques.free.lpNorm<Eigen::Infinity>() + 1e-6);
+        const auto& friction = system_.frictions[f];
+        const double limit =
+            friction.is_free_side(torque) ? std::max(friction.drag, least) : friction.holding(when, z);
+        const double ratio = std::abs(torque) / std::max(limit, 1e-300);
         if (ratio <= worst) continue;
         worst = ratio;
         if (which) *which = static_cast<int>(f);
@@ -230,7 +310,7 @@ void Solver::settle(When when) {
         int worst = -1;
         if (worst_overload(when, work_, mode, &worst) > 1 + overload_tolerance) {
             const auto f = static_cast<std::size_t>(worst);
-            mode.friction[f] = toward(work_.friction[worst]);
+            mode.friction[f] = toward(system_.frictions[f].opens_towards(when, z, work_.friction[worst]));
             note(when.t, system_.frictions[f].name, "slips");
             continue;
         }
@@ -267,7 +347,8 @@ void Solver::begin(double inside) {
 
 void Solver::margins(When when, const Vector& state, Vector& g) {
     solve(when, state, mode, work_);
-    g.resize(static_cast<Eigen::Index>(2 * system_.frictions.size() + 2 * system_.meshes.size()));
+    g.resize(static_cast<Eigen::Index>(2 * system_.frictions.size() + 2 * system_.meshes.size() +
+                                       system_.plays.size()));
     const double speed_tolerance = 1e-12 * speed_scale(state);
     // Twice what consistent() asks for: a mode it accepts is not left at once.
     const double torque_tolerance = 2e-9 * (work_.free.lpNorm<Eigen::Infinity>() + 1e-6);
@@ -280,8 +361,9 @@ void Solver::margins(When when, const Vector& state, Vector& g) {
         if (mode.friction[f] == Hold::free)
             second = threshold - holding;
         else if (mode.friction[f] == Hold::held)
-            first = holding * (1 + 2 * overload_tolerance) -
-                    std::abs(work_.friction[static_cast<Eigen::Index>(f)]);
+            first = friction.reserve(when, state, work_.friction[static_cast<Eigen::Index>(f)],
+                                     2 * overload_tolerance) +
+                    (friction.sense != 0 ? torque_tolerance : 0);
         else
             first =
                 sign_of(mode.friction[f]) * friction.column.dot(state.head(system_.masses)) + speed_tolerance;
@@ -306,6 +388,11 @@ void Solver::margins(When when, const Vector& state, Vector& g) {
         g[i++] = first;
         g[i++] = second;
     }
+    for (std::size_t p = 0; p < system_.plays.size(); ++p) {
+        const auto& play = system_.plays[p];
+        g[i++] = play.margin(mode.flank[p], twist(play, state), rate(play, state)) +
+                 1e-12 * (play.stiffness * play.half_gap + play.damping);
+    }
 }
 
 bool Solver::violated(When when, const Vector& state) {
@@ -316,6 +403,13 @@ bool Solver::violated(When when, const Vector& state) {
 // Closes pairs whose slip has just changed sign at (when, z) and brings the mode up to date.
 void Solver::apply_violations(When when) {
     margins(when, z, margins_);
+    const auto first_play = static_cast<std::size_t>(margins_.size()) - system_.plays.size();
+    for (std::size_t p = 0; p < system_.plays.size(); ++p) {
+        if (margins_[static_cast<Eigen::Index>(first_play + p)] >= 0) continue;
+        const auto& play = system_.plays[p];
+        mode.flank[p] = mode.flank[p] != 0 ? 0 : play.pressed(twist(play, z), rate(play, z));
+        note(when.t, play.name, mode.flank[p] != 0 ? "closes" : "opens");
+    }
     bool joined = false;
     for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
         if (sign_of(mode.friction[f]) == 0 || margins_[static_cast<Eigen::Index>(2 * f)] >= 0) continue;
@@ -351,7 +445,7 @@ Sample Solver::sample(When when) {
         if (sign != 0) {
             const double slip = system_.frictions[f].column.dot(z.head(system_.masses));
             s.friction_torque[static_cast<Eigen::Index>(f)] =
-                sign * system_.frictions[f].sliding(when, z, slip);
+                sign * system_.frictions[f].slides(when, z, slip, sign);
             // Pushes against devices that hold: they share the load as their history has it.
             if (std::abs(slip) < 1e-9) resting = true;
         }
@@ -395,7 +489,7 @@ Solver::Energy Solver::power(When when, const Vector& state, const Vector& force
         const double s = sign_of(mode.friction[f]);
         if (s == 0) continue;
         const double slip = system_.frictions[f].column.dot(omega);
-        p.dissipated += s * slip * system_.frictions[f].sliding(when, state, slip);
+        p.dissipated += s * slip * system_.frictions[f].slides(when, state, slip, s);
     }
     const Response* response = nullptr;
     for (std::size_t m = 0; m < system_.meshes.size(); ++m) {
@@ -439,9 +533,14 @@ void Solver::rk4(double t, double inside, double h, Vector& out, Energy& energy)
 double Solver::fastest_rate() {
     const Vector root = system_.inertia.cwiseSqrt().cwiseInverse();
     const Matrix a = root.asDiagonal() * system_.shaft_columns;
-    const Matrix k = a * system_.stiffness.asDiagonal() * a.transpose();
-    const Matrix d = a * system_.damping.asDiagonal() * a.transpose() +
-                     root.asDiagonal() * system_.damper * root.asDiagonal();
+    Vector stiffness = system_.stiffness, damping = system_.damping;
+    for (const auto& play : system_.plays) {
+        stiffness[play.shaft] = play.stiffness;
+        damping[play.shaft] = play.damping;
+    }
+    const Matrix k = a * stiffness.asDiagonal() * a.transpose();
+    const Matrix d =
+        a * damping.asDiagonal() * a.transpose() + root.asDiagonal() * system_.damper * root.asDiagonal();
     return std::max(std::sqrt(k.operatorNorm()), d.operatorNorm());
 }
 

@@ -41,7 +41,7 @@ struct Result {
 
 class Solver {
   public:
-    explicit Solver(const System& system);
+    explicit Solver(const System& system, Sharing sharing = Sharing::free);
 
     // Continues where the last run ended; the first begins at time 0 and samples it too.
     Result run(double until, const Options& options);
@@ -67,6 +67,9 @@ class Solver {
     };
     void solve(When when, const Vector& state, const Mode& trial, Torques& out);
     void free_torque(When when, const Vector& state, const Mode& trial, Vector& out);
+    // Among the splits that no mass feels, one within what meshes at rest can lose that loads held friction devices
+    // least for their capacity. What is at rest stays so as long as some split is within all limits.
+    void share(When when, const Vector& state, const Mode& trial, const Response& response, Torques& torques);
     bool settle_meshes(When when);
     bool consistent(const Mode& trial, const Torques& torques);
     double worst_overload(When when, const Torques& torques, const Mode& trial, int* which);
@@ -75,6 +78,8 @@ class Solver {
     void note(double time, const std::string& device, const char* what);
     double acceleration_tolerance(const Vector& column, const Torques& torques) const;
     double speed_scale(const Vector& state) const;
+    double twist(const System::Play& play, const Vector& state) const;
+    double rate(const System::Play& play, const Vector& state) const;
     struct Energy {
         double input = 0, dissipated = 0;
     };
@@ -91,6 +96,7 @@ class Solver {
     Responses responses_;
     Torques work_;
     Energy energy_;
+    std::map<const Response*, int> branch_;  // of share(): the one that worked last
     Vector force_, extra_, k1_, k2_, k3_, k4_, stage_, margins_;
 };
 

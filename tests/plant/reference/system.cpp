@@ -79,7 +79,8 @@ int System::mass(const std::string& name) const {
 
 System::System(const plant::Description& d) {
     masses = static_cast<int>(d.masses.size());
-    shafts = static_cast<int>(d.shafts.size());
+    const int plain = static_cast<int>(d.shafts.size());
+    shafts = plain + static_cast<int>(d.backlashes.size());
     inertia.resize(masses);
     start = Vector::Zero(masses + shafts);
     for (int i = 0; i < masses; ++i) {
@@ -91,7 +92,7 @@ System::System(const plant::Description& d) {
     shaft_columns = Matrix::Zero(masses, shafts);
     stiffness.resize(shafts);
     damping.resize(shafts);
-    for (int e = 0; e < shafts; ++e) {
+    for (int e = 0; e < plain; ++e) {
         const auto& s = d.shafts[static_cast<std::size_t>(e)];
         shaft_names.push_back(s.name);
         shaft_columns.col(e) += unit(masses, mass(s.a));
@@ -99,6 +100,14 @@ System::System(const plant::Description& d) {
         stiffness[e] = s.stiffness;
         damping[e] = s.damping;
         start[masses + e] = s.initial_twist;
+    }
+    for (int e = plain; e < shafts; ++e) {
+        const auto& b = d.backlashes[static_cast<std::size_t>(e - plain)];
+        shaft_names.push_back(b.name);
+        shaft_columns.col(e) += unit(masses, mass(b.a)) - unit(masses, mass(b.b));
+        stiffness[e] = damping[e] = 0;
+        start[masses + e] = b.initial_twist;
+        plays.push_back({b.name, e, b.stiffness, b.damping, 0.5 * b.gap});
     }
     damper = Matrix::Zero(masses, masses);
     for (const auto& k : d.dampers) {
@@ -110,6 +119,19 @@ System::System(const plant::Description& d) {
         frictions.push_back(friction_of(clutch, *this));
         if (const auto* direct = std::get_if<plant::ActuationDirect>(&clutch.actuation))
             collect_breaks(direct->profile, breaks);
+    }
+    for (const auto& f : d.freewheels) {
+        Friction friction;
+        friction.name = f.name;
+        friction.column = unit(masses, mass(f.a));
+        if (!f.b.empty()) friction.column -= unit(masses, mass(f.b));
+        friction.nominal = f.rated_torque;
+        friction.sense = f.blocks == plant::Sense::forward ? 1 : -1;
+        friction.drag = f.drag_torque;
+        const double sliding = f.sliding_share * f.rated_torque, holding = f.rated_torque;
+        friction.sliding = [sliding](When, const Vector&, double) { return sliding; };
+        friction.holding = [holding](When, const Vector&) { return holding; };
+        frictions.push_back(friction);
     }
     const auto add_mesh = [this](const std::string& name, double u, double eta, int one, int two,
                                  int carrier) {

@@ -11,6 +11,8 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -38,6 +40,24 @@ struct Friction {
     // Capacities [Nm] ≥ 0; sliding depends on |slip|.
     std::function<double(When, const Vector& z, double slip)> sliding;
     std::function<double(When, const Vector& z)> holding;
+    // A freewheel has these capacities in one sense, ±1, and in the other its drag in place of both.
+    double sense = 0, drag = 0;
+
+    bool is_free_side(double sign) const { return sense * sign < 0; }
+    double slides(When when, const Vector& z, double slip, double sign) const {
+        return is_free_side(sign) ? drag : sliding(when, z, slip);
+    }
+    // What a held device has left of its limit, and the sense in which it begins to slip at this torque.
+    double reserve(When when, const Vector& z, double torque, double tolerance) const {
+        const double limit = holding(when, z) * (1 + tolerance);
+        return sense == 0 ? limit - std::abs(torque)
+                          : std::min(limit - sense * torque, drag + sense * torque);
+    }
+    double opens_towards(When when, const Vector& z, double torque) const {
+        return sense == 0                                                  ? torque
+               : drag + sense * torque < holding(when, z) - sense * torque ? -sense
+                                                                           : sense;
+    }
 };
 
 struct Mesh {
@@ -75,6 +95,31 @@ struct System {
     Vector inertia;
     Matrix shaft_columns;  // masses × shafts
     Vector stiffness, damping;
+    // A shaft with play has its twist among the shafts, at their end; its torque depends on the flank that is closed, ±1 or
+    // 0, which belongs to the mode.
+    struct Play {
+        std::string name;
+        int shaft;
+        double stiffness, damping, half_gap;
+        double torque(int flank, double twist, double rate) const {
+            return flank == 0 ? 0 : stiffness * (twist - flank * half_gap) + damping * rate;
+        }
+        // The flank that presses, or would if it were closed.
+        int pressed(double twist, double rate) const {
+            for (const int flank : {1, -1})
+                if (flank * twist >= half_gap && flank * torque(flank, twist, rate) > 0) return flank;
+            return 0;
+        }
+        // Positive while the flank stays as it is.
+        double margin(int flank, double twist, double rate) const {
+            if (flank != 0) return flank * torque(flank, twist, rate);
+            const auto open = [&](int side) {
+                return std::max(stiffness * (half_gap - side * twist), -side * torque(side, twist, rate));
+            };
+            return std::min(open(1), open(-1));
+        }
+    };
+    std::vector<Play> plays;
     Matrix damper;  // M̃ −= damper·ω
     std::vector<Friction> frictions;
     std::vector<Mesh> meshes;

@@ -1,0 +1,54 @@
+// One-way clutch (freewheel, sprag or roller clutch) between a and b: it joins both in one sense of the slip
+// Δω = ω_a − ω_b, the blocked one, and lets them go in the other.
+//
+//     locked        Δω = 0        −M_D ≤ s M ≤ M_R
+//     overrunning   s Δω < 0      M = −s M_D
+//     overloaded    s Δω > 0      M = s α M_R
+//
+//   M     torque on the first link, from a into the freewheel   Nm
+//   Δω    slip, a minus b                                       rad/s
+//   s     blocked sense of Δω                                   +1 a cannot run ahead of b, −1 a cannot fall behind
+//   M_R   rated torque: the static capacity in that sense       Nm, > 0
+//   α     share of it that is left while overloaded rollers slip   1, in (0, 1]
+//   M_D   drag while overrunning                                Nm, ≥ 0
+//
+// A friction pair ([Algin] §4) whose capacities depend on the sign: with M_R = M_D and α = 1 it is a Coulomb clutch,
+// with M_D = 0 a ratchet of infinitely many teeth. The torque is continuous where it lets go, so the instant of that
+// needs no more than a step's order; where it locks, the slip changes sign.
+// Does not model: elasticity of rollers and races (put a shaft beside it), the angle until the rollers grip, drag that
+// depends on speed, sprags that lift off, damage by an overload.
+#pragma once
+
+#include <algorithm>
+
+#include "plant/description.h"
+
+namespace shiftrig::plant {
+
+struct FreewheelLaw {
+    int pair = -1;     // its friction pair
+    double sense = 1;  // s
+    double rated = 0;  // M_R [Nm]
+    double drag = 0;   // M_D [Nm]
+};
+
+inline FreewheelLaw freewheel_law(const Freewheel& f, int pair) noexcept {
+    return {pair, f.blocks == Sense::forward ? 1. : -1., f.rated_torque, f.drag_torque};
+}
+
+// What is left until a locked freewheel at torque M changes its state [Nm]; negative: beyond it.
+inline double freewheel_margin(const FreewheelLaw& law, double torque) noexcept {
+    return std::min(law.rated - law.sense * torque, law.drag + law.sense * torque);
+}
+
+// Is the limit next to torque M the one at which it begins to overrun?
+inline bool is_next_to_overrun(const FreewheelLaw& law, double torque) noexcept {
+    return law.drag + law.sense * torque < law.rated - law.sense * torque;
+}
+
+// Static limit on the side to which M points [Nm].
+inline double freewheel_limit(const FreewheelLaw& law, double torque) noexcept {
+    return law.sense * torque < 0 ? law.drag : law.rated;
+}
+
+}  // namespace shiftrig::plant
