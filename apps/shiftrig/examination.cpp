@@ -122,7 +122,15 @@ std::vector<Examination::TieUp> find_tie_ups(const plant::Description& machine,
     const int output = structure.mass(machine.output_mass);
     const auto examine = [&](const std::string& gear, const std::string& with,
                              std::vector<std::string> closed) {
-        if (!with.empty()) closed.push_back(with);
+        if (!with.empty()) {
+            // A freewheel holds the path as it is; what one more clutch drives it to, it lets go.
+            std::erase_if(closed, [&](const std::string& name) {
+                const int pair = structure.pair(name);
+                return pair >= 0 &&
+                       structure.pairs[static_cast<std::size_t>(pair)].kind == plant::PairKind::freewheel;
+            });
+            closed.push_back(with);
+        }
         const plant::RigidSet set = plant::rigid_set(machine, structure, closed);
         const Eigen::MatrixXd motions = plant::motions(set, structure.inertia);
         Examination::TieUp found{gear, with, false, {}};
