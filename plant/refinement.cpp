@@ -37,7 +37,8 @@ bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         double* difference = w.scratch.vector_c.data();
         double* change = w.scratch.vector_b.data();
         for (int k = 0; k < m.forces; ++k) difference[k] = end.f[k] - late.f[k];
-        m.kernel.multiply(w.scratch.used.from_late, padded(mode.order), m.forces, difference, nullptr, change);
+        m.kernel.multiply(w.scratch.used.from_late, padded(mode.order), m.forces, difference, nullptr,
+                          change);
         double fastest = 0, moved = 0;
         for (int j = 0; j < m.masses; ++j) fastest = std::max(fastest, std::fabs(end.z[j]));
         for (int i = 0; i < mode.order; ++i) {

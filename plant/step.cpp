@@ -109,8 +109,10 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     Mode* mode = &begin_mode(w);
 
     double length = 1;  // of a part, at most
-    int leans = m.description.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
-    int dips = m.description.maximum_events;   // margins looked at where they are least
+    int leans =
+        m.description
+            .maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
+    int dips = m.description.maximum_events;  // margins looked at where they are least
     const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.description.maximum_parts : 1);
     for (double done = 0; done < 1;) {
         // Advance over what is left, up to the next jump of a law; in halves where that is too much at once.
@@ -133,8 +135,8 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
         Crossing first = first_crossing(w, *mode, s.begin, s.end);
-        const bool inside =
-            first.device >= 0 && localise && outputs.certificate.events * length < m.description.maximum_events;
+        const bool inside = first.device >= 0 && localise &&
+                            outputs.certificate.events * length < m.description.maximum_events;
         double reached = until;
         // What a mesh does by itself it does only beyond its limit: there is always a little way to go.
         if (inside && first.change == Change::state && first.theta * (until - done) < instant) {

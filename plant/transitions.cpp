@@ -360,7 +360,8 @@ bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) {
         double least = overload;
         int taker = -1;
         for (int k = 0; k < m.pairs; ++k) {
-            if (!slips(w.contact[k]) || !mode.bound[k] || w.scratch.overcome[static_cast<std::size_t>(k)]) continue;
+            if (!slips(w.contact[k]) || !mode.bound[k] || w.scratch.overcome[static_cast<std::size_t>(k)])
+                continue;
             if (std::fabs(device_slip(w, k, s.z)) > at_rest) continue;
             std::copy(w.contact, w.contact + m.contact_bytes, trial);
             trial[device] = moving(direction, x);
@@ -604,7 +605,8 @@ double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Samp
         case Change::state: return margin(w, crossing.device, s);
         case Change::turn: return turning_margin(w, crossing.device, s);
         case Change::release: return -release_drive(w, mode, crossing.device - w.model.pairs, s);
-        case Change::limit: return loss_left(w, crossing.device - w.model.pairs, s);
+        case Change::limit:
+            return loss_left(w, crossing.device - w.model.pairs, s);
     }
     return 0;
 }
@@ -640,7 +642,8 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         const double slope = 4 * gm - 3 * g0 - g1, bend = 2 * (g0 - 2 * gm + g1);
         if (!(g0 >= 0 && g1 > 0 && slope < 0)) return;
         const double theta = -0.5 * slope / bend;
-        if (theta > 0.02 && theta < 0.98 && g0 + 0.5 * slope * theta < 0.1 * std::min(g0, g1)) first = std::min(first, theta);
+        if (theta > 0.02 && theta < 0.98 && g0 + 0.5 * slope * theta < 0.1 * std::min(g0, g1))
+            first = std::min(first, theta);
     };
     // What has just been let go begins at zero: it may be driven back at first.
     const auto begun = [](double slip) { return std::fabs(slip) < at_rest ? 0 : slip; };
@@ -701,7 +704,8 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
             begin_known = true;
             const double before = loss_left(w, leader, begin);
             const double theta = before / (before - left);
-            if (before > 0 && (first.device < 0 || theta < first.theta)) first = {m.pairs + leader, theta, Change::limit};
+            if (before > 0 && (first.device < 0 || theta < first.theta))
+                first = {m.pairs + leader, theta, Change::limit};
             continue;
         }
         const double before = std::min(release_drive(w, mode, leader, begin), 0.);
