@@ -22,7 +22,7 @@
 // full stroke with p > p_return; HydraulicStep says when, so that the engine can split its step there. All
 // else is continuous, p with two derivatives.
 // Source: usual electro-hydraulic clutch model; figures are estimates (docs/mechanics.md).
-// Does not model: flow forces, leakage, compressibility, a faster or slower emptying than filling.
+// Does not model: flow forces, leakage, compressibility, a different emptying; p may swing below 0: harmless suction.
 #pragma once
 
 #include <algorithm>

@@ -104,7 +104,8 @@ TEST(Clutch, StickSlipHasThePeriodOfTheClosedForm) {
             ASSERT_GE(slips.size(), 7u);
             // The prototype, exact between events as ETD3 is, reached 1.4e-7 s. ARK3 damps a swing of hω by the ratio
             // 2e-5 (hω/0.084)³; of 0.36 m that takes ζ·slip_time, and the belt brings 0.2 m/s.
-            const double damped = method == Method::ark3 ? 2e-5 * std::pow(h / 0.084, 3) * slip_time * 0.36 / 0.2 : 0;
+            const double damped =
+                method == Method::ark3 ? 2e-5 * std::pow(h / 0.084, 3) * slip_time * 0.36 / 0.2 : 0;
             const double bound = 3 * 1.4e-7 + damped;
             for (std::size_t i = 2; i < slips.size(); ++i) {
                 EXPECT_NEAR(slips[i] - slips[i - 1], period, bound) << "h = " << h;
@@ -131,7 +132,8 @@ TEST(Clutch, SlipThatTouchesZeroWithinAStepLocks) {
         d.sources = {source("load", ramp)};
         Rig rig(d);
         rig.step();
-        const auto locks = rig.times(EventKind::lock, "brake"), goes = rig.times(EventKind::break_away, "brake");
+        const auto locks = rig.times(EventKind::lock, "brake"),
+                   goes = rig.times(EventKind::break_away, "brake");
         ASSERT_EQ(locks.size(), 1u);
         ASSERT_EQ(goes.size(), 1u);
         EXPECT_NEAR(locks[0], 5e-4, 1e-9);
@@ -151,7 +153,8 @@ TEST(Clutch, TorqueThatIsTooMuchOnlyWithinAStepBreaksItLoose) {
         d.masses = {mass("load", 1)};
         d.clutches = {clutch("brake", "load", "", 4)};
         d.clutches[0].initially_locked = true;
-        d.sources = {source("load", sine(4.2, omega / (2 * pi), -1e300, 1e300, -std::asin(3.6 / 4.2) / omega))};
+        d.sources = {
+            source("load", sine(4.2, omega / (2 * pi), -1e300, 1e300, -std::asin(3.6 / 4.2) / omega))};
         Rig rig(d);
         rig.step();
         const auto goes = rig.times(EventKind::break_away, "brake");

@@ -148,7 +148,8 @@ TEST(Ark3, DiffersInTheFrictionProblemByItsOwnOrder) {
         while (exact.state.time() < 1 - 1e-9) {
             exact.step();
             tree.step();
-            worst = std::max(worst, std::fabs(exact.out("clutch.clutch.slip") - tree.out("clutch.clutch.slip")));
+            worst =
+                std::max(worst, std::fabs(exact.out("clutch.clutch.slip") - tree.out("clutch.clutch.slip")));
         }
         return worst;
     };
@@ -187,7 +188,8 @@ TEST_P(EachEngine, CornersOfTheEngineCurveAreHarmless) {
     Engine engine;
     engine.name = "diesel";
     engine.mass = "engine";
-    engine.full_load = {{73, 550}, {89, 700}, {105, 880}, {126, 1060}, {147, 1170}, {168, 1201}, {188, 1144}, {210, 972}, {220, 858}, {226, 729}};
+    engine.full_load = {{73, 550},   {89, 700},   {105, 880}, {126, 1060}, {147, 1170},
+                        {168, 1201}, {188, 1144}, {210, 972}, {220, 858},  {226, 729}};
     engine.governor_slope = 187;
     engine.low_idle = 94;
     engine.high_idle = 229;
@@ -214,7 +216,8 @@ TEST_P(EachEngine, CornersOfTheEngineCurveAreHarmless) {
     EXPECT_GT(exact.back(), 226) << "it reached the governor line";
     const auto worst = [&](const std::vector<double>& speeds) {
         double most = 0;
-        for (std::size_t k = 0; k < speeds.size(); ++k) most = std::max(most, std::fabs(speeds[k] - exact[k]));
+        for (std::size_t k = 0; k < speeds.size(); ++k)
+            most = std::max(most, std::fabs(speeds[k] - exact[k]));
         return most;
     };
     const double coarse = worst(trace(1)), fine = worst(trace(4));

@@ -169,7 +169,8 @@ TEST(Valve, SuctionAfterADropIsThatOfTheClosedFormAndMovesNothing) {
         }
     }
     const double zeta = 0.8;
-    const double closed = -150 * bar / 60 * std::exp(-zeta * (std::acos(-1.0) - std::acos(zeta)) / std::sqrt(1 - zeta * zeta));
+    const double closed =
+        -150 * bar / 60 * std::exp(-zeta * (std::acos(-1.0) - std::acos(zeta)) / std::sqrt(1 - zeta * zeta));
     EXPECT_NEAR(least, closed, 1e-2 * std::fabs(closed));  // the lag has been there for 7.2/ω
     EXPECT_GT(least, -0.1 * bar);
     FrictionLaw law;

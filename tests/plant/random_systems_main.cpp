@@ -121,7 +121,8 @@ int main(int argc, char** argv) {
         "worst ledger defect %.1e of the energy moved; reference %.3f s per system\n",
         worst_agreeing, events, fall_backs, worst_defect,
         reference_seconds / static_cast<double>(arguments.count));
-    const long incomparable = tally[Outcome::sensitive] + tally[Outcome::ambiguous] + tally[Outcome::reference_failed];
+    const long incomparable =
+        tally[Outcome::sensitive] + tally[Outcome::ambiguous] + tally[Outcome::reference_failed];
     const bool good = tally[Outcome::disagrees] == 0 && tally[Outcome::broken] == 0 &&
                       100 * incomparable <= arguments.count;
     return good ? 0 : 1;

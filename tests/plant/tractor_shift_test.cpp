@@ -53,7 +53,8 @@ TEST_P(TractorShift, NextStepRuleShowsItsOwnOrder) {
     const std::vector<int> steps = {1, 2, 4, 8, 16};
     for (const int n : steps) {
         const double log_h = -std::log2(n);
-        const double log_error = std::log2(error(run_plant(cases::tractor_shift(GetParam()), n, next_step), truth()).worst);
+        const double log_error =
+            std::log2(error(run_plant(cases::tractor_shift(GetParam()), n, next_step), truth()).worst);
         x += log_h;
         y += log_error;
         xx += log_h * log_h;
@@ -77,7 +78,9 @@ TEST_P(TractorShift, KeepsItsOrderWhilePistonsFill) {
             valve->fill_flow = 20e-3 / 60;
         }
     };
-    const auto run = [&](int steps) { return run_plant(cases::tractor_shift(GetParam()), steps, with_pistons); };
+    const auto run = [&](int steps) {
+        return run_plant(cases::tractor_shift(GetParam()), steps, with_pistons);
+    };
     const ShiftTrace converged = run(32);
     EXPECT_GT(error(converged, truth()).worst, 1e-2) << "the fill delays F3";
     const double coarse = error(run(1), converged).worst, fine = error(run(8), converged).worst;

@@ -44,7 +44,7 @@ struct Response {
 // Where mechanics does not determine how devices at rest share a load, it is assumed to be shared in the way that
 // spares the fullest of them.
 enum class Sharing : std::int8_t {
-    free,     // by any split that no mass feels
+    free,  // by any split that no mass feels
     by_loss,  // by the losses of meshes at rest alone; friction devices share in proportion to what they can carry
 };
 

@@ -84,7 +84,8 @@ void Solver::solve(When when, const Vector& state, const Mode& trial, Torques& o
     if (response.friction_freedom.cols() > 0) share(when, state, trial, response, out);
 }
 
-void Solver::share(When when, const Vector& state, const Mode& trial, const Response& response, Torques& out) {
+void Solver::share(When when, const Vector& state, const Mode& trial, const Response& response,
+                   Torques& out) {
     // Unknowns: the use u of capacities, and how much of each change, forwards and backwards. The limits of a mesh at
     // rest, −f(−M) ≤ L ≤ f(M), f the larger of two lines, are one linear program for each choice of lines.
     const Eigen::Index ways = response.friction_freedom.cols(), unknowns = 1 + 2 * ways;
