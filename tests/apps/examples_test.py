@@ -48,10 +48,12 @@ class Listener(threading.Thread):
         self.start()
 
     def run(self):
-        while not self.ended:
+        while True:  # until nothing more comes: the last frames may still wait in the socket
             message = self.bus.recv(0.2)
             if message is not None:
                 self.frames.setdefault(message.arbitration_id, []).append(bytes(message.data))
+            elif self.ended:
+                return
 
     def stop(self):
         self.ended = True
