@@ -21,6 +21,8 @@ struct Group {
     bool (*takes)(const plant::Signal&);
 };
 
+bool is_pair(const plant::Signal& s) { return s.name.starts_with("clutch.") || s.name.starts_with("freewheel."); }
+
 const Group groups[] = {
     {"Driver", [](const plant::Signal& s) { return s.name.starts_with("driver.") && s.unit == Unit::one; }},
     {"Clutch pressure commands",
@@ -37,11 +39,13 @@ const Group groups[] = {
      [](const plant::Signal& s) { return s.name.starts_with("mass.") && s.unit == Unit::metre_per_second; }},
     {"Vehicle acceleration", [](const plant::Signal& s) { return s.name.ends_with(".acceleration"); }},
     {"Clutch slip",
-     [](const plant::Signal& s) { return s.name.starts_with("clutch.") && s.name.ends_with(".slip"); }},
+     [](const plant::Signal& s) { return is_pair(s) && s.name.ends_with(".slip"); }},
     {"Shaft torques",
-     [](const plant::Signal& s) { return s.name.starts_with("shaft.") && s.name.ends_with(".torque"); }},
+     [](const plant::Signal& s) {
+         return (s.name.starts_with("shaft.") || s.name.starts_with("backlash.")) && s.name.ends_with(".torque");
+     }},
     {"Clutch torques",
-     [](const plant::Signal& s) { return s.name.starts_with("clutch.") && s.name.ends_with(".torque"); }},
+     [](const plant::Signal& s) { return is_pair(s) && s.name.ends_with(".torque"); }},
     {"Facing temperatures",
      [](const plant::Signal& s) { return s.name.starts_with("clutch.") && s.unit == Unit::celsius; }},
     {"Bus and loop",

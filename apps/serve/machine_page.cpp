@@ -101,7 +101,12 @@ class Page {
             torques.push_back(stem + ".torque");
             slips.push_back(stem + ".slip");
         }
+        for (const auto& freewheel : machine_.freewheels) {
+            torques.push_back("freewheel." + freewheel.name + ".torque");
+            slips.push_back("freewheel." + freewheel.name + ".slip");
+        }
         for (const auto& shaft : machine_.shafts) shafts.push_back("shaft." + shaft.name + ".torque");
+        for (const auto& backlash : machine_.backlashes) shafts.push_back("backlash." + backlash.name + ".torque");
         for (const auto& sensor : machine_.sensors) speeds.push_back("mass." + sensor.mass + ".speed");
         if (speeds.empty())
             for (const auto& mass : machine_.masses)
