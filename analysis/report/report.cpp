@@ -21,7 +21,9 @@ struct Group {
     bool (*takes)(const plant::Signal&);
 };
 
-bool is_pair(const plant::Signal& s) { return s.name.starts_with("clutch.") || s.name.starts_with("freewheel."); }
+bool is_pair(const plant::Signal& s) {
+    return s.name.starts_with("clutch.") || s.name.starts_with("freewheel.");
+}
 
 const Group groups[] = {
     {"Driver", [](const plant::Signal& s) { return s.name.starts_with("driver.") && s.unit == Unit::one; }},
@@ -32,20 +34,17 @@ const Group groups[] = {
     {"Clutch pressures",
      [](const plant::Signal& s) { return s.name.starts_with("clutch.") && s.name.ends_with(".pressure"); }},
     {"Speeds",
-     [](const plant::Signal& s) {
-         return s.name.starts_with("mass.") && s.unit == Unit::radian_per_second;
-     }},
+     [](const plant::Signal& s) { return s.name.starts_with("mass.") && s.unit == Unit::radian_per_second; }},
     {"Vehicle speed",
      [](const plant::Signal& s) { return s.name.starts_with("mass.") && s.unit == Unit::metre_per_second; }},
     {"Vehicle acceleration", [](const plant::Signal& s) { return s.name.ends_with(".acceleration"); }},
-    {"Clutch slip",
-     [](const plant::Signal& s) { return is_pair(s) && s.name.ends_with(".slip"); }},
+    {"Clutch slip", [](const plant::Signal& s) { return is_pair(s) && s.name.ends_with(".slip"); }},
     {"Shaft torques",
      [](const plant::Signal& s) {
-         return (s.name.starts_with("shaft.") || s.name.starts_with("backlash.")) && s.name.ends_with(".torque");
+         return (s.name.starts_with("shaft.") || s.name.starts_with("backlash.")) &&
+                s.name.ends_with(".torque");
      }},
-    {"Clutch torques",
-     [](const plant::Signal& s) { return is_pair(s) && s.name.ends_with(".torque"); }},
+    {"Clutch torques", [](const plant::Signal& s) { return is_pair(s) && s.name.ends_with(".torque"); }},
     {"Facing temperatures",
      [](const plant::Signal& s) { return s.name.starts_with("clutch.") && s.unit == Unit::celsius; }},
     {"Bus and loop",
