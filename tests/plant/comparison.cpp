@@ -79,7 +79,7 @@ Deviation deviation(const Table& truth, const Table& other, const ComparisonOpti
             const double range = std::max(high[i] - low[i], options.range_floor * largest[truth.unit[i]]);
             const double difference = std::abs(truth.rows[k][i] - other.rows[k][i]);
             double ratio =
-                difference / (options.tolerance * range + options.rounding * size[truth.unit[i]] + options.rest);
+                difference / (options.tolerance * range + options.rounding * size[truth.unit[i]] + 1e-12);
             if (!std::isfinite(ratio)) ratio = 1e300;
             if (smooth) d.worst_speed = std::max(d.worst_speed, ratio);
             if (ratio <= d.worst) continue;

@@ -15,7 +15,6 @@ struct ComparisonOptions {
     double tolerance = 1e-4;     // of a signal's range
     double range_floor = 1e-3;   // a range counts as at least this share of the largest of its unit
     double rounding = 1e-9;      // of the largest value of a unit: no solution of a linear system is better
-    double rest = 1e-9;  // [rad/s, rad, Nm] below which both solvers take a thing for at rest
     double perturbation = 1e-9;  // relative, on speeds, capacities and torques
     double event_clearance =
         2e-5;  // torques jump with contact states: samples nearer to a change are left out [s]
