@@ -193,10 +193,18 @@ class OnLcm(unittest.TestCase):
         self.replays(self.path("live.lcmlog"))
         start = min(when for channel, when, data in events(wire) if channel == "SHIFTRIG_SPEEDS")
         write_log(commands, [e for e in events(wire) if e[0] == "SHIFTRIG_CLUTCH_COMMAND" and e[1] >= start])
-        rig = subprocess.Popen([RIG, "run", "--scenario", SCENARIO, "--controller", "none", "--bus", BUS, "--pace", "wall",
-                                "--duration", "4", "--record", self.path("played.lcmlog")],
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        subprocess.run(["lcm-logplayer", "--lcm-url=" + URL, commands], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=200)
+        heard = self.path("heard.log")
+        with Beside("lcm-logger", "-q", "--flush-interval=10", "--lcm-url=" + URL, heard):
+            time.sleep(1)
+            rig = subprocess.Popen([RIG, "run", "--scenario", SCENARIO, "--controller", "none", "--bus", BUS, "--pace", "wall",
+                                    "--duration", "4", "--record", self.path("played.lcmlog")],
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            # The player starts with the rig's first tick, however long the rig takes to prepare.
+            patience = time.monotonic() + 100
+            while time.monotonic() < patience and b"SHIFTRIG_SPEEDS" not in open(heard, "rb").read():
+                time.sleep(0.02)
+            subprocess.run(["lcm-logplayer", "--lcm-url=" + URL, commands], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                           timeout=200)
         self.assertEqual(rig.wait(200), 0)
         self.assertIn("F3 locks", self.explained(self.path("played.lcmlog")))
 
