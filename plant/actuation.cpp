@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <span>
 
+#include "plant/few.h"
 #include "plant/forces.h"
 
 namespace shiftrig::plant::detail {
@@ -70,7 +71,7 @@ bool is_quiet(const Work& w, int pair) noexcept {
     const PairLaw& law = w.model.pair_laws[i];
     const PairCommand& command = w.operators.commands[i];
     return !law.hydraulic->solenoid && !command.valve_held &&
-           is_quiet(*law.hydraulic, read_hydraulic(w.next + law.actuator),
+           is_quiet(*law.hydraulic, w.next[law.actuator + steady_slot], read_hydraulic(w.next + law.actuator),
                     static_cast<std::size_t>(law.delay_slots), command.target);
 }
 
@@ -118,7 +119,7 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
     // Most stand where their commands want them.
-    std::copy(w.operators.rest_loads.begin(), w.operators.rest_loads.end(), s.held.begin());
+    copy_few(w.operators.rest_loads.data(), m.pairs, s.held.data());
     std::fill(s.moves.begin(), s.moves.end(), static_cast<unsigned char>(0));
     s.moving_count = 0;
 
@@ -144,7 +145,7 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
 void hold_actuation(Work& w) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
-    std::copy(w.operators.rest_loads.begin(), w.operators.rest_loads.end(), s.held.begin());
+    copy_few(w.operators.rest_loads.data(), m.pairs, s.held.data());
     std::fill(s.moves.begin(), s.moves.end(), static_cast<unsigned char>(0));
     s.moving_count = 0;
     for (const int k : m.hydraulic_pairs) {

@@ -93,7 +93,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
         lower = v.lower;
     }
 
-    list_passing_pairs(w);
+    tabulate_contact(w, mode);
     if (s.begin_groups != &mode) {
         read_groups(m, t, begin.z, v.begin);
         group_forces(t, begin.f, v.begin.force);
@@ -153,7 +153,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     write_state(m, t, v.end, end.z);
     tree_slips(m, mode, end);
     end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
-    evaluate_forces(w, w.contact, end);
+    end_forces(w, end);
     group_forces(t, end.f, v.end.force);
     s.torque_residual = rigid_torques(w, mode, v.end, end);
     const double middle = 0.5 * (from + end_fraction);

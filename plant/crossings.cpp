@@ -13,6 +13,9 @@ namespace {
 // Power that turns round by less is corrected, not located: loss that changes, of the largest torque.
 constexpr double small_loss = 1e-4, small_loss_of_parts = 1e-7;
 
+// A locked pair that carries more than this of what it holds may have carried more yet within the part.
+constexpr double strained = 0.8;
+
 // Root in [0, 1] of the parabola through g(0), its slope there (per unit length) and g(1) < 0.
 double parabola_root(double g0, double slope, double g1) {
     if (g0 <= 0) {
@@ -45,27 +48,38 @@ double turning_margin(const Work& w, int device, const Sample& s) {
     return (s.torque[device] - loss_kink(w, device - w.model.pairs, sign)) * sign * loss_exponent(state);
 }
 
+SpeedCheck speed_check(const Work& w) {
+    const ScratchData& s = w.scratch;
+    return {w.operators.table.sense, s.begin.slip, s.half.slip, s.end.slip, w.model.law_rows};
+}
+
+// Is a locked pair under more than this share of its static capacity? On a tree any pair may be
+// locked, otherwise the first rows of the mode tell which.
+bool some_pair_strained(const Work& w, const Mode& mode, double share, const Sample& s) {
+    const int count = mode.tree ? w.model.pairs : mode.first_mesh;
+    bool found = false;
+    for (int i = 0; i < count; ++i) {
+        const int k = mode.tree ? i : mode.rows[i];
+        found |= w.contact[k] == locked && std::fabs(s.torque[k]) > share * s.holding[k];
+    }
+    return found;
+}
+
 // Is every state good until the end of the part? The usual answer, quickly; a no only sends us to look closely.
 bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
     const ModelData& m = w.model;
-    // Pairs that slip carry no internal torque, and the slip of locked ones has no sign.
-    double reserve = 0, forward = 0;  // the least of all, 0 if there is some everywhere
-    for (int k = 0; k < m.pairs; ++k) {
-        reserve = std::min(reserve, end.holding[k] - std::fabs(end.torque[k]));
-        forward = std::min(forward, slip_sign(w.contact[k]) * end.slip[k]);
+    if (mode.rests || some_pair_strained(w, mode, 1, end) || !m.kernel.loops.senses_hold(speed_check(w)))
+        return false;
+    const ContactTable& table = w.operators.table;
+    const double *const drive = table.drive, *const offset = table.drive_offset, *const torque = end.torque + m.pairs;
+    bool turned = false;
+    for (int k = 0, meshes = m.meshes; k < meshes; ++k) turned |= drive[k] * torque[k] - offset[k] < 0;
+    if (turned || !mode.tree) return !turned;
+    for (const int k : m.lossy_meshes) {  // a tree has no motions in its view
+        if (motion_sign(w.contact[m.pairs + k]) * slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z) < 0)
+            return false;
     }
-    if (reserve < 0 || forward < 0) return false;
-    if (mode.rests) return false;
-    double moving = 0, driving = 0;
-    for (const int k : m.lossy_meshes) {
-        const unsigned char state = w.contact[m.pairs + k];
-        const double sign = motion_sign(state), x = loss_exponent(state);
-        const double slip =
-            mode.tree ? slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z) : end.motion[k];
-        moving = std::min(moving, sign * slip);
-        driving = std::min(driving, (end.torque[m.pairs + k] - loss_kink(w, k, sign)) * (sign * x));
-    }
-    return !(moving < 0 || driving < 0);
+    return true;
 }
 
 // What a locked freewheel would have to pass on against its sense, all_hold() does not see.
@@ -121,6 +135,7 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const Sample &begin = w.scratch.begin, &half = w.scratch.half, &end = w.scratch.end;
     double first = 1;
     if (mode.tree) return first;
+    if (!some_pair_strained(w, mode, strained, end) && !m.kernel.loops.may_dip(speed_check(w))) return first;
     // The least of the parabola through three margins; that they are about to vanish is enough to look closer.
     const auto consider = [&](double g0, double gm, double g1) {
         const double slope = 4 * gm - 3 * g0 - g1, bend = 2 * (g0 - 2 * gm + g1);
@@ -138,7 +153,7 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         if (slips(state)) {
             const double sign = slip_sign(state);
             consider(begun(sign * begin.slip[k]), sign * half.slip[k], sign * end.slip[k]);
-        } else if (state == locked && std::fabs(end.torque[k]) > 0.8 * end.holding[k] &&
+        } else if (state == locked && std::fabs(end.torque[k]) > strained * end.holding[k] &&
                    !freewheel_of(w, k)) {
             if (!torques_known) complete_half(w, mode);
             torques_known = true;

@@ -8,7 +8,7 @@
 // Q_k = h φ_k(hL) S̃. What z0 and f0 give to all three comes from one product, what fa and fb add from one each.
 #include "plant/etd3.h"
 
-#include <algorithm>
+#include "plant/few.h"
 
 namespace shiftrig::plant::detail {
 
@@ -28,7 +28,7 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     const double middle = 0.5 * (begin.at.fraction + end_fraction);
     half.at = {w.start + middle * w.h, middle, Side::right};
     late.at = end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
-    list_passing_pairs(w);
+    tabulate_contact(w, mode);
 
     // One block of coordinates each for half way, the late stage and the end: first what the beginning gives to all
     // three, then what each stage adds to those after it.
@@ -37,28 +37,27 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     double* const at_late = at_half + block;
     double* const at_end = at_late + block;
     kernel.multiply(op.from_begin, 3 * block, n + m.forces, read_coordinates(mode, begin), nullptr, at_half);
-    for (int i = 0; i < m.auxiliary; ++i)
+    for (int i = 0, count = m.auxiliary; i < count; ++i)
         half.auxiliary[i] = begin.auxiliary[i] + 0.5 * h * begin.auxiliary_rate[i];
-    std::copy(at_half, at_half + n, half.f - n);
+    copy_few(at_half, n, half.f - n);
     show(m, mode, at_half, half, m.law_rows);
     stage_forces(w, half);
 
     kernel.multiply(op.from_half, 2 * block, m.forces, half.f, at_late, at_late);
-    for (int i = 0; i < m.auxiliary; ++i) {
+    for (int i = 0, count = m.auxiliary; i < count; ++i)
         late.auxiliary[i] = begin.auxiliary[i] + h * (2 * half.auxiliary_rate[i] - begin.auxiliary_rate[i]);
-    }
     show(m, mode, at_late, late, m.law_rows);
     stage_forces(w, late);
 
-    kernel.multiply(op.from_late, block, m.forces, late.f, at_end, at_end);
-    for (int i = 0; i < m.auxiliary; ++i) {
+    double* const end_coordinates = end.f - n;
+    kernel.multiply(op.from_late, block, m.forces, late.f, at_end, end_coordinates);
+    for (int i = 0, count = m.auxiliary; i < count; ++i) {
         end.auxiliary[i] =
             begin.auxiliary[i] +
             h / 6 * (begin.auxiliary_rate[i] + 4 * half.auxiliary_rate[i] + late.auxiliary_rate[i]);
     }
-    std::copy(at_end, at_end + n, end.f - n);
-    show(m, mode, at_end, end, padded(m.seen));
-    evaluate_forces(w, w.contact, end);
+    show(m, mode, end_coordinates, end, padded(m.seen));
+    end_forces(w, end);
     active_torques(m, mode, end);
 }
 

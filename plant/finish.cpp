@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "plant/few.h"
 #include "plant/laws/sensor.h"
 #include "plant/ledger.h"
 #include "plant/transitions.h"
@@ -22,60 +23,48 @@ void load_sample(const ModelData& m, const double* block, double time, Sample& s
     s.at = {time, 0, Side::right};
 }
 
-// What a beginning is made of besides inputs: speeds to contact states, engine modes.
-template <typename Function>
-void for_motion(const ModelData& m, const Function& function) {
-    const StateLayout& at = m.layout;
-    function(at.speeds, at.actuators - at.speeds);
-    function(at.engines, 3 * static_cast<int>(m.engines.size()));
-}
-
 // Is the sample that the last step ended with the beginning of this one? Then its forces and torques are
-// what computing them again would give, bit for bit.
+// what computing them again would give, bit for bit. They come from speeds, twists, auxiliary states, contact states and
+// the engines' modes.
 bool is_carried(const ModelData& m, const OperatorsData& o, const double* block) {
     if (!o.carried || m.depends_on_time) return false;
-    bool same = true;
-    const double* known = o.carried_motion.data();
-    for_motion(m, [&](int first, int count) {
-        const auto size = static_cast<std::size_t>(count);
-        same = same && std::memcmp(known, block + first, size * sizeof(double)) == 0;
-        known += count;
-    });
-    return same;
+    const StateLayout& at = m.layout;
+    const Sample& s = o.samples[0];
+    // The step ended with the table up to date.
+    return same_bits(s.z, block + at.speeds, m.states) && same_bits(s.auxiliary, block + at.auxiliary, m.auxiliary) &&
+           std::memcmp(o.table.contact.data(), block + at.contact, o.table.contact.size()) == 0 &&
+           same_bits(o.carried_engines.data(), block + at.engines, 3 * static_cast<int>(m.engines.size()));
 }
 
-void carry(const ModelData& m, OperatorsData& o, const double* block) {
-    double* known = o.carried_motion.data();
-    for_motion(m, [&](int first, int count) { known = std::copy(block + first, block + first + count, known); });
-}
-
-void reset(Outputs& outputs, ScratchData& scratch) {
+void reset(Outputs& outputs, ScratchData& scratch, int forces) {
     outputs.certificate = {};
     outputs.event_count = 0;
     scratch.told_events = 0;
-    std::fill(scratch.heat.begin(), scratch.heat.end(), 0.);
+    clear_few(scratch.work, scratch.work + forces);
     scratch.dissipated = scratch.input_work = 0;
     scratch.begin_groups = nullptr;
 }
 
 void advance_temperatures(Work& w) {
     const ModelData& m = w.model;
-    const double oil = input(w, m.oil_temperature), per_step = 1 / w.h;
-    for (const int k : m.heated_pairs) {
-        const PairLaw& law = m.pair_laws[static_cast<std::size_t>(k)];
-        double* at = w.next + law.temperature;
-        HeatState state{at[0], at[1]};
-        advance_heat(law.heat_operator, state, w.scratch.heat[static_cast<std::size_t>(k)] * per_step, oil);
-        if (state.surface > at[0]) {
-            const auto passes = [&](double limit) { return limit > 0 && at[0] < limit && state.surface >= limit; };
-            const double end = w.start + w.h;
-            if (passes(law.heat->warn_temperature))
-                log_event(w, EventKind::facing_warning, k, end, 0, 0, state.surface);
-            if (passes(law.heat->fail_temperature))
-                log_event(w, EventKind::facing_failure, k, end, 0, 0, state.surface);
-        }
-        at[0] = state.surface;
-        at[1] = state.bulk;
+    const auto count = static_cast<int>(m.heated_pairs.size());
+    if (count == 0) return;
+    double* const before = w.scratch.vector_b;
+    const HeatNumbers& heat = m.heat;
+    const HeatTerms terms{heat.e11.data(), heat.e12.data(), heat.e21.data(),  heat.e22.data(),  heat.f1.data(),
+                          heat.f2.data(),  heat.warn.data(), heat.fail.data(), heat.pair.data(), count};
+    double* const surface = w.next + m.layout.temperatures;
+    if (!m.kernel.loops.heat(terms, w.scratch.work, 1 / w.h, input(w, m.oil_temperature), surface,
+                             surface + m.layout.bulk_temperature, before))
+        return;
+    for (int i = 0; i < count; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        const auto passes = [&](double limit) { return before[i] < limit && surface[i] >= limit; };
+        const double end = w.start + w.h;
+        if (passes(heat.warn[k]))
+            log_event(w, EventKind::facing_warning, m.heated_pairs[k], end, 0, 0, surface[i]);
+        if (passes(heat.fail[k]))
+            log_event(w, EventKind::facing_failure, m.heated_pairs[k], end, 0, 0, surface[i]);
     }
 }
 
@@ -102,49 +91,61 @@ void advance_engine_modes(Work& w) {
     }
 }
 
-// While the block still holds the speeds that the step began with.
-void advance_sensors(Work& w, const double* end_speeds) {
+// A wheel with missing teeth tells each tooth from the others.
+void pick_up_slowly(Work& w, const SensorSlots& slots, const double* begin_speeds, const double* end_speeds) {
     const ModelData& m = w.model;
-    const double* begin_speeds = w.next + m.layout.speeds;
-    double* at = w.next + m.layout.sensors;
-    for (std::size_t i = 0; i < m.sensors.size(); ++i, at += 4) {
+    for (std::size_t i = 0; i < m.sensors.size(); ++i) {
         const int mass = m.sensors[i].mass;
-        const SensorFaults& faults = w.operators.sensor_faults[i];
-        SensorState state{at[0], at[1], at[2], at[3]};
-        advance_pickup(m.description.sensors[i], state, begin_speeds[mass], end_speeds[mass], w.h, faults.missing_teeth);
-        const auto count = static_cast<std::uint64_t>(read_integer(w.next) + 1);
-        const double deviate = faults.noise > 0 ? noise(noise_seed, i, count) : 0;
-        sensor_output(state, faults, deviate);
-        at[0] = state.position;
-        at[1] = state.since_edge;
-        at[2] = state.reading;
-        at[3] = state.output;
+        SensorState state{slots.position[i], slots.since_edge[i], slots.reading[i], 0};
+        advance_pickup(m.description.sensors[i], state, begin_speeds[mass], end_speeds[mass], w.h,
+                       w.operators.sensor_faults[i].missing_teeth);
+        slots.position[i] = state.position;
+        slots.since_edge[i] = state.since_edge;
+        slots.reading[i] = state.reading;
     }
 }
 
-// In four running sums.
-double sum_of_squares(const double* v, int count) {
-    double sums[4] = {};
-    int i = 0;
-    for (; i + 4 <= count; i += 4) {
-        for (int lane = 0; lane < 4; ++lane) sums[lane] += v[i + lane] * v[i + lane];
+void disturb_readings(Work& w, const SensorSlots& slots) {
+    const auto count = static_cast<std::uint64_t>(read_integer(w.next) + 1);
+    for (std::size_t i = 0; i < w.model.sensors.size(); ++i) {
+        const SensorFaults& faults = w.operators.sensor_faults[i];
+        SensorState state{0, 0, slots.reading[i], slots.output[i]};
+        sensor_output(state, faults, faults.noise > 0 ? noise(noise_seed, i, count) : 0);
+        slots.output[i] = state.output;
     }
-    for (int lane = 0; i < count; ++i, ++lane) sums[lane] += v[i] * v[i];
-    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
+
+// While the block still holds the speeds that the step began with.
+void advance_sensors(Work& w, const double* end_speeds) {
+    const ModelData& m = w.model;
+    const int count = static_cast<int>(m.sensors.size());
+    if (count == 0) return;
+    const double* begin_speeds = w.next + m.layout.speeds;
+    const SensorSlots slots = sensor_slots(m.layout, m.sensors.size(), w.next);
+    if (w.operators.teeth_missing) {
+        pick_up_slowly(w, slots, begin_speeds, end_speeds);
+    } else {
+        const PickupNumbers& p = m.pickups;
+        const PickupTerms terms{p.teeth.data(),          p.pitch.data(), p.directional.data(),
+                                p.drop_out_speed.data(), p.mass.data(),  count};
+        m.kernel.loops.pick_up(terms, begin_speeds, end_speeds, w.h, slots.position, slots.since_edge, slots.reading);
+    }
+    if (w.operators.sensors_disturbed) {
+        disturb_readings(w, slots);
+    } else {
+        copy_few(slots.reading, count, slots.output);
+    }
 }
 
 // Residual of [Algin] eq. (15) at the sample, as a length, relative to that of all torques in it.
 double torque_residual(Work& w, const Mode& mode, const Sample& s) {
     const ModelData& m = w.model;
     if (mode.row_count == 0) return 0;
-    const int columns = mode.order + m.forces + mode.row_count;
-    double* terms = w.scratch.vector_b;  // q, f, M side by side
-    std::copy(s.f - mode.order, s.f + m.forces, terms);
-    std::copy(s.active, s.active + mode.row_count, terms + mode.order + m.forces);
-    double* rest = w.scratch.vector_a;
-    m.kernel.multiply(mode.balance, padded(mode.row_count), columns, terms, nullptr, rest);
-    const double scale = sum_of_squares(terms + mode.order, m.forces + mode.row_count);
-    return scale > 0 ? std::sqrt(sum_of_squares(rest, mode.row_count) / scale) : 0;
+    double* const rest = w.scratch.vector_a;
+    // q, f, M stand side by side.
+    m.kernel.multiply(mode.balance, padded(mode.row_count), mode.order + m.forces + mode.row_count,
+                      s.f - mode.order, nullptr, rest);
+    return std::sqrt(m.kernel.loops.share_of_squares(rest, mode.row_count, s.f, m.forces + mode.row_count));
 }
 
 double constraint_violation(const Mode& mode, const double* speeds) {
@@ -159,14 +160,14 @@ void report_changes(Work& w, const Mode& mode) {
     const double end = w.start + w.h;
     const Sample& s = w.scratch.begin;
     // Power that turns round in a mesh, once the mesh is loaded: idle pinions turn to and fro around nothing.
-    for (int k = 0; k < m.meshes; ++k) {
-        const unsigned char is = w.contact[m.pairs + k];
-        double& told = w.next[m.layout.drive_sides + k];
-        const int x = loss_exponent(is);
-        if (is == stuck || told == x || std::fabs(s.torque[m.pairs + k]) < m.noteworthy_torque) continue;
-        if (!m.structure.meshes[static_cast<std::size_t>(k)].lossy()) continue;
-        if (told != 0) log_event(w, EventKind::drive_side, m.pairs + k, end, s.torque[m.pairs + k], 0, x);
-        told = x;
+    double* const told = w.next + m.layout.drive_sides;
+    const double* const direction = w.operators.table.direction;
+    const double* const torque = s.torque + m.pairs;
+    for (const int k : m.lossy_meshes) {
+        const double x = direction[k];
+        if (told[k] == x || x == 0 || std::fabs(torque[k]) < m.noteworthy_torque) continue;
+        if (told[k] != 0) log_event(w, EventKind::drive_side, m.pairs + k, end, torque[k], 0, x);
+        told[k] = x;
     }
     // A loop that has become closed: one event, its members as a set of bits in place of the slip.
     double& tie_up = w.next[m.layout.tie_up];
@@ -193,7 +194,7 @@ Work begin_step(const ModelData& m, OperatorsData& operators, State& state, Outp
     auto* contact = reinterpret_cast<unsigned char*>(block + m.layout.contact);
     const double h = m.options.step_size;
     const double time = static_cast<double>(read_integer(block)) * h;
-    reset(outputs, scratch);
+    reset(outputs, scratch, m.forces);
     scratch.begin = operators.samples[0];
     scratch.end = operators.samples[1];
     if (is_carried(m, operators, block)) {
@@ -217,8 +218,7 @@ bool is_begun(const Work& w) SHIFTRIG_REALTIME {
     if (!w.operators.carried) return false;
     const ScratchData& scratch = w.scratch;
     const Sample& s = scratch.begin;
-    const auto count = static_cast<std::size_t>(w.model.actuated_pairs);
-    if (scratch.moving_count == 0) return std::memcmp(scratch.held.data(), s.load, count * sizeof(double)) == 0;
+    if (scratch.moving_count == 0) return same_bits(scratch.held.data(), s.load, w.model.actuated_pairs);
     for (int k = 0; k < w.model.actuated_pairs; ++k) {
         const auto i = static_cast<std::size_t>(k);
         if ((scratch.moves[i] ? pair_load(w, k, s.at) : scratch.held[i]) != s.load[k]) return false;
@@ -232,7 +232,7 @@ Work begin_look(const ModelData& m, OperatorsData& operators, const State& state
     const auto* contact = reinterpret_cast<const unsigned char*>(block + m.layout.contact);
     const double h = m.options.step_size;
     const double time = static_cast<double>(read_integer(block)) * h;
-    reset(outputs, scratch);
+    reset(outputs, scratch, m.forces);
     scratch.begin = operators.samples[0];
     scratch.end = operators.samples[1];
     operators.carried = false;
@@ -259,13 +259,14 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     double* block = w.next;
     Certificate& certificate = w.outputs.certificate;
 
+    tabulate_contact(w, mode);
     advance_sensors(w, s.begin.z);
     write_integer(block, read_integer(block) + 1);
-    std::copy(s.begin.z, s.begin.z + m.states, block + layout.speeds);  // twists follow the speeds
-    std::copy(s.begin.auxiliary, s.begin.auxiliary + m.auxiliary, block + layout.auxiliary);
+    copy_few(s.begin.z, m.states, block + layout.speeds);  // twists follow the speeds
+    copy_few(s.begin.auxiliary, m.auxiliary, block + layout.auxiliary);
     advance_engine_modes(w);
     advance_temperatures(w);
-    for (int k = 0; k < m.pairs; ++k) block[layout.heat + k] += s.heat[static_cast<std::size_t>(k)];
+    for (int k = 0; k < m.pairs; ++k) block[layout.heat + k] += s.work[k];
     block[layout.energy] += s.input_work;
     block[layout.energy + 1] += s.dissipated;
 
@@ -283,11 +284,12 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     o.samples[1] = s.end;
     o.carried = s.carries;
     o.carried_energy = s.stored;
-    carry(m, o, block);
+    copy_few(block + layout.engines, 3 * static_cast<int>(m.engines.size()), o.carried_engines.data());
 }
 
 void finish_look(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     Sample& s = w.scratch.begin;
+    tabulate_contact(w, mode);
     w.outputs.certificate.constraint_violation = constraint_violation(mode, s.z);
     w.outputs.certificate.torque_residual =
         mode.tree ? w.scratch.torque_residual : torque_residual(w, mode, s);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "plant/few.h"
 #include "plant/laws/converter.h"
 #include "plant/laws/plough.h"
 #include "plant/laws/road.h"
@@ -30,7 +31,6 @@ void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcep
         holding[k] = load[k] * static_factor[k];
         sliding[k] = load[k] * sliding_at_rest[k];
     }
-    std::fill(s.f, s.f + pairs, 0.);
     for (int k = 0; k < pairs; ++k) {
         if (contact[k] == locked) continue;
         if (s.load[k] != 0) {  // one that is about to engage shows what it would pass
@@ -99,10 +99,14 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
         known.grade_forces[i] = grade_force(m.description.roads[i], input(w, m.grade), m.description.gravity);
     }
     for (std::size_t i = 0; i < m.sources.size(); ++i) known.source_inputs[i] = input(w, m.sources[i].input);
+    known.teeth_missing = known.sensors_disturbed = false;
     for (std::size_t i = 0; i < m.sensors.size(); ++i) {
         const SensorLaw& law = m.sensors[i];
         known.sensor_faults[i] = {input(w, law.bias), input(w, law.noise), input(w, law.stuck) > 0.5,
                                   input(w, law.dropout) > 0.5, static_cast<int>(input(w, law.missing_teeth))};
+        const SensorFaults& faults = known.sensor_faults[i];
+        known.teeth_missing |= faults.missing_teeth > 0;
+        known.sensors_disturbed |= faults.bias != 0 || faults.noise > 0 || faults.stuck;
     }
     latch_commands(w);
     known.draft = m.draft < 0 ? 1 : input(w, m.draft);
@@ -111,78 +115,99 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
 
 namespace {
 
-// Torques that no contact state concerns, rates of the auxiliary states, and what the laws press together. They read
-// speeds where they act: f[force] is paid for by −slip[force].
+void load_pairs(const Work& w, Sample& s) noexcept {
+    const ScratchData& scratch = w.scratch;
+    copy_few(scratch.held.data(), w.model.pairs, s.load);
+    for (int i = 0; i < scratch.moving_count; ++i) {
+        const int k = scratch.moving[static_cast<std::size_t>(i)];
+        s.load[k] = pair_load(w, k, s.at);
+    }
+}
+
+// What open clutches drag; all other forces 0 for now.
+void open_drags(const Work& w, Sample& s) noexcept {
+    const ModelData& m = w.model;
+    m.kernel.loops.drag(w.operators.table.drag, m.drag_speed_limit, s.slip, m.pairs, s.f);
+    clear_few(s.f + m.pairs, s.f + m.forces);
+}
+
+// Torques that no contact state concerns, rates of the auxiliary states, and what the laws press together, added to
+// what is in f and load. They read speeds where they act: f[force] is paid for by −slip[force].
 void law_forces(const Work& w, Sample& s) noexcept {
     const ModelData& m = w.model;
     const Description& d = m.description;
     const OperatorsData& known = w.operators;
-    std::fill(s.f + m.first_external, s.f + m.forces, 0.);
+    const double* const slip = s.slip;
+    double *const f = s.f, *const load = s.load;
     const double* auxiliary = s.auxiliary;
     double* rate = s.auxiliary_rate;
-    for (std::size_t t = 0; t < m.tyres.size(); ++t, ++auxiliary, ++rate) {
-        const TyreLaw& law = m.tyres[t];
-        const BrixiusTyre& tyre = d.tyres[t];
-        const double wheel_speed = -s.slip[law.wheel_force], body_speed = -s.slip[law.body_force];
-        const TyreMotion motion = tyre_motion(tyre, *auxiliary, wheel_speed, body_speed);
-        *rate = motion.rate;
-        const double slip = s.tyre_slip[t] = motion.slip;
-        const double force = s.tyre_force[t] = tyre_force(known.soils[t], slip);
-        s.f[law.wheel_force] -= force * tyre.radius;
-        s.f[law.body_force] += force;
-        s.load[law.resistance] += tyre_resistance(known.soils[t], slip);
+    const BrixiusTyre* tyre = d.tyres.data();
+    const TyreSoil* soil = known.soils.data();
+    double *tyre_slip = s.tyre_slip, *traction = s.tyre_force;
+    for (const TyreLaw& law : m.tyres) {
+        const TyreMotion motion = tyre_motion(*tyre, *soil, *auxiliary++, -slip[law.wheel_force], -slip[law.body_force]);
+        *rate++ = motion.rate;
+        *tyre_slip++ = motion.slip;
+        const double force = tyre_force(*soil, motion.slip);
+        *traction++ = force;
+        f[law.wheel_force] -= force * tyre->radius;
+        f[law.body_force] += force;
+        load[law.resistance] += tyre_resistance(*soil, motion.slip);
+        ++tyre;
+        ++soil;
     }
-    for (std::size_t e = 0; e < m.engines.size(); ++e, auxiliary += 2, rate += 2) {
-        const EngineLaw& law = m.engines[e];
-        const Engine& engine = d.engines[e];
+    const Engine* engine = d.engines.data();
+    const EngineSetting* setting = known.engine_settings.data();
+    const EngineMode* mode = w.scratch.engine_modes.data();
+    double *engine_torque_shown = s.engine_torque, *full_load_shown = s.engine_full_load;
+    for (const EngineLaw& law : m.engines) {
+        const double speed = -slip[law.force];
+        const double full = full_load(*engine, law.full_load, speed);
+        *full_load_shown++ = full;
         const EngineState state{auxiliary[0], auxiliary[1]};
-        const EngineMode mode = w.scratch.engine_modes[e];
-        const double speed = -s.slip[law.force];
-        const double full = s.engine_full_load[e] = full_load(engine, law.full_load, speed);
-        EngineState change;
-        if (mode == EngineMode::running)
-            change = engine_rate(engine, known.engine_settings[e], state, speed, full);
-        rate[0] = change.torque;
-        rate[1] = change.boost;
-        s.engine_torque[e] = engine_torque(engine, known.engine_settings[e], state, mode, speed, full);
-        s.f[law.force] += s.engine_torque[e];
-        s.load[law.pair] = stalled_friction_capacity(engine, mode, speed);
+        const EngineDrive drive = engine_drive(*engine, *setting, state, *mode, speed, full);
+        rate[0] = drive.rate.torque;
+        rate[1] = drive.rate.boost;
+        *engine_torque_shown++ = drive.torque;
+        f[law.force] += drive.torque;
+        load[law.pair] = stalled_friction_capacity(*engine, *mode, speed);
+        auxiliary += 2;
+        rate += 2;
+        ++engine;
+        ++setting;
+        ++mode;
     }
-    for (std::size_t c = 0; c < m.converters.size(); ++c) {
-        const ConverterLaw& law = m.converters[c];
+    const TorqueConverter* converter = d.converters.data();
+    double* converter_torque = s.converter;
+    for (const ConverterLaw& law : m.converters) {
         const ConverterTorques torques =
-            converter_torques(d.converters[c], -s.slip[law.pump_force], -s.slip[law.turbine_force]);
-        s.converter[2 * c] = torques.pump;
-        s.converter[2 * c + 1] = torques.turbine;
-        s.f[law.pump_force] -= torques.pump;
-        s.f[law.turbine_force] += torques.turbine;
+            converter_torques(*converter++, -slip[law.pump_force], -slip[law.turbine_force]);
+        *converter_torque++ = torques.pump;
+        *converter_torque++ = torques.turbine;
+        f[law.pump_force] -= torques.pump;
+        f[law.turbine_force] += torques.turbine;
     }
-    for (std::size_t i = 0; i < m.sources.size(); ++i) {
-        const TorqueSource& source = d.sources[i];
-        const int force = m.sources[i].force;
-        double torque = known.source_inputs[i];
-        if (!source.waveform.pieces.empty()) torque += waveform(source.waveform, s.at.time, s.at.side);
-        if (source.quadratic != 0) torque += source.quadratic * s.slip[force] * std::fabs(s.slip[force]);
-        s.f[force] += torque;
+    const TorqueSource* source = d.sources.data();
+    const double* told = known.source_inputs.data();
+    for (const SourceLaw& law : m.sources) {
+        double torque = *told++;
+        if (!source->waveform.pieces.empty()) torque += waveform(source->waveform, s.at.time, s.at.side);
+        if (source->quadratic != 0) torque += source->quadratic * slip[law.force] * std::fabs(slip[law.force]);
+        f[law.force] += torque;
+        ++source;
     }
-    for (std::size_t i = 0; i < m.road_force.size(); ++i) {
-        const int force = m.road_force[i];
-        s.f[force] += known.grade_forces[i] + air_force(d.roads[i], -s.slip[force]);
-    }
-    for (std::size_t p = 0; p < m.plough_pair.size(); ++p) {
-        s.load[m.plough_pair[p]] += plough_draft(d.ploughs[p], -s.slip[m.plough_force[p]], known.draft);
-    }
+    const Road* road = d.roads.data();
+    const double* grade = known.grade_forces.data();
+    for (const int force : m.road_force) f[force] += *grade++ + air_force(*road++, -slip[force]);
+    for (const PloughLaw& law : m.ploughs) load[law.pair] += plough_draft(law.curve, -slip[law.force], known.draft);
 }
 
 }  // namespace
 
 void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHIFTRIG_REALTIME {
-    const ScratchData& scratch = w.scratch;
-    std::copy(scratch.held.begin(), scratch.held.end(), s.load);
-    for (int i = 0; i < scratch.moving_count; ++i) {
-        const int k = scratch.moving[static_cast<std::size_t>(i)];
-        s.load[k] = pair_load(w, k, s.at);
-    }
+    const ModelData& m = w.model;
+    load_pairs(w, s);
+    std::fill(s.f, s.f + m.forces, 0.);
     law_forces(w, s);
     pair_forces(w, contact, s);
     freewheel_forces(w, contact, s);
@@ -190,41 +215,37 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHI
     bearing_forces(w, contact, s);
 }
 
-void list_passing_pairs(Work& w) SHIFTRIG_REALTIME {
-    const ModelData& m = w.model;
-    ScratchData& s = w.scratch;
-    s.sliding_count = s.dragging_count = 0;
-    int sliding = 0, dragging = 0;
-    for (int k = 0; k < m.pairs; ++k) {
-        const unsigned char state = w.contact[k];
-        if (state == locked) continue;
-        const auto i = static_cast<std::size_t>(k);
-        if (state != free_running) {
-            const bool pressed = s.held[i] != 0 || s.moves[i] || k >= m.actuated_pairs;
-            if (pressed) s.sliding[static_cast<std::size_t>(sliding++)] = k;
-        } else if (m.pair_laws[i].drag > 0) {
-            s.dragging[static_cast<std::size_t>(dragging++)] = k;
-        }
-    }
-    s.sliding_count = sliding;
-    s.dragging_count = dragging;
-}
-
 void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
+    const ContactTable& table = w.operators.table;
     const ScratchData& scratch = w.scratch;
-    std::copy(scratch.held.begin(), scratch.held.end(), s.load);
-    std::fill(s.f, s.f + m.first_external, 0.);
+    copy_few(scratch.held.data(), m.pairs, s.load);
+    open_drags(w, s);
     law_forces(w, s);
-    for (int i = 0; i < scratch.sliding_count; ++i) {
-        const int k = scratch.sliding[static_cast<std::size_t>(i)];
+    for (int i = 0; i < table.pressed_count; ++i) {
+        const int k = table.pressed[static_cast<std::size_t>(i)];
         const auto at = static_cast<std::size_t>(k);
         const double load = scratch.moves[at] ? pair_load(w, k, s.at) : s.load[k];
-        s.f[k] = slip_sign(w.contact[k]) * sliding_capacity(m.pair_laws[at].friction, load, s.slip[k]);
+        if (load == 0) continue;
+        s.f[k] = table.sense[k] * sliding_capacity(m.pair_laws[at].friction, load, s.slip[k]);
     }
-    for (int i = 0; i < scratch.dragging_count; ++i) {
-        const int k = scratch.dragging[static_cast<std::size_t>(i)];
-        s.f[k] = open_drag(w, k, s);
+    freewheel_forces(w, w.contact, s);
+    flank_forces(w, w.contact, s);
+    bearing_forces(w, w.contact, s);
+}
+
+void end_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const ContactTable& table = w.operators.table;
+    load_pairs(w, s);
+    open_drags(w, s);
+    law_forces(w, s);
+    m.kernel.loops.press(s.load, m.static_factor.data(), m.sliding_at_rest.data(), m.pairs, s.holding, s.sliding);
+    for (int i = 0; i < table.pressed_count; ++i) {
+        const int k = table.pressed[static_cast<std::size_t>(i)];
+        if (s.load[k] == 0) continue;
+        s.sliding[k] = sliding_capacity(m.pair_laws[static_cast<std::size_t>(k)].friction, s.load[k], s.slip[k]);
+        s.f[k] = table.sense[k] * s.sliding[k];
     }
     freewheel_forces(w, w.contact, s);
     flank_forces(w, w.contact, s);
@@ -249,13 +270,23 @@ void internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALT
     active_torques(w.model, mode, s);
 }
 
-void active_torques(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+void row_torques(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const int rows = mode.row_count + static_cast<int>(m.translating.size());
     m.kernel.multiply(mode.torques, padded(rows), mode.order + m.forces, s.f - mode.order, nullptr, s.active);
+}
+
+void active_torques(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    row_torques(m, mode, s);
     double* const torque = s.torque;
     const double* const active = s.active;
-    std::fill(torque, torque + m.torques, 0.);
-    for (int r = 0, count = mode.row_count; r < count; ++r) torque[mode.rows[r]] = active[r];
+    for (int k = 0, pairs = m.pairs; k < pairs; ++k) torque[k] = 0;
+    for (int r = 0, closed = mode.first_mesh; r < closed; ++r) torque[mode.rows[r]] = active[r];
+    double *const mesh = torque + m.pairs, *const lost = mesh + m.meshes;
+    for (int k = 0, meshes = m.meshes; k < meshes; ++k) {
+        mesh[k] = active[mode.first_mesh + k];
+        lost[k] = 0;
+    }
+    for (int r = mode.first_mesh + m.meshes; r < mode.row_count; ++r) torque[mode.rows[r]] = active[r];
 }
 
 double* read_coordinates(const Mode& mode, const Sample& s) SHIFTRIG_REALTIME {

@@ -47,10 +47,11 @@ bool is_pressed(const Work& work, int pair, const Instant& at) SHIFTRIG_REALTIME
 // auxiliary rates.
 void evaluate_forces(const Work& work, const unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;
 
-// The same while a part of a step is under way, where nobody asks what pairs could hold or pass: forces f and
-// auxiliary rates alone, of the pairs that list_passing_pairs() found when the part began.
-void list_passing_pairs(Work& work) SHIFTRIG_REALTIME;
+// The same for the contact states in force, once tabulate_contact() has looked at them. While a part of a step is under
+// way, where nobody asks what pairs could hold or pass: forces f and auxiliary rates alone.
 void stage_forces(const Work& work, Sample& sample) SHIFTRIG_REALTIME;
+// At the end of a part: all of it, bit for bit what evaluate_forces() gives.
+void end_forces(const Work& work, Sample& sample) SHIFTRIG_REALTIME;
 
 // The part of f that depends on the contact states, from capacities already there.
 void contact_forces(const Work& work, const unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;
@@ -59,6 +60,8 @@ void contact_forces(const Work& work, const unsigned char* contact, Sample& samp
 void internal_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 // The same where the coordinates stand before f already.
 void active_torques(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+// Only as `active`, by row of the mode.
+void row_torques(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
 // The coordinates of the mode, read out of z into their place before f.
 double* read_coordinates(const Mode& mode, const Sample& sample) SHIFTRIG_REALTIME;

@@ -1,5 +1,7 @@
 #include "plant/kernels.h"
 
+#include <cstdint>
+
 namespace shiftrig::plant::detail {
 namespace {
 
@@ -30,10 +32,14 @@ void multiply_portable(const double* panel, int rows, int columns, const double*
     if (r < rows) multiply_panel<4>(panel + r * columns, columns, v, y0 ? y0 + r : nullptr, y + r);
 }
 
+constexpr int lanes = 2;
+
+#include "plant/device_loops_body.h"
+
 }  // namespace
 
 Kernel portable_kernel() {
-    Kernel kernel{KernelKind::portable, "portable", {}};
+    Kernel kernel{KernelKind::portable, "portable", {}, device_loops};
     for (Multiply& product : kernel.products) product = multiply_portable;
     return kernel;
 }

@@ -8,6 +8,7 @@
 
 #include <vector>
 
+#include "plant/device_loops.h"
 #include "plant/plant.h"
 
 namespace shiftrig::plant::detail {
@@ -51,6 +52,7 @@ struct Kernel {
     KernelKind kind{};
     const char* name = "";
     Multiply products[short_products + 1] = {};  // [rows / 4 − 1], the taller ones last
+    DeviceLoops loops;
 
     void multiply(const double* panel, int rows, int columns, const double* v, const double* y0,
                   double* y) const SHIFTRIG_REALTIME {

@@ -4,6 +4,7 @@
 #if defined(SHIFTRIG_X86_KERNELS)
 #include <immintrin.h>
 
+#include <cstdint>
 #include <utility>
 
 namespace shiftrig::plant::detail {
@@ -54,6 +55,9 @@ struct Four {
 
 constexpr int most_panels = 1;
 
+constexpr int lanes = 4;
+
+#include "plant/device_loops_body.h"
 #include "plant/kernels_body.h"
 
 }  // namespace

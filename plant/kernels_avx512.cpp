@@ -4,6 +4,7 @@
 #if defined(SHIFTRIG_X86_KERNELS)
 #include <immintrin.h>
 
+#include <cstdint>
 #include <utility>
 
 namespace shiftrig::plant::detail {
@@ -39,6 +40,9 @@ struct Four {
 
 constexpr int most_panels = 3;
 
+constexpr int lanes = 8;
+
+#include "plant/device_loops_body.h"
 #include "plant/kernels_body.h"
 
 }  // namespace

@@ -56,5 +56,5 @@ void tall_product(const double* panel, int rows, int columns, const double* v, c
 SHIFTRIG_TRUSTED_END
 
 Kernel kernel_of(KernelKind kind, const char* name) {
-    return {kind, name, {product<4>, product<8>, product<12>, product<16>, product<20>, product<24>, tall_product}};
+    return {kind, name, {product<4>, product<8>, product<12>, product<16>, product<20>, product<24>, tall_product}, device_loops};
 }

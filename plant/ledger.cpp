@@ -4,15 +4,11 @@
 #include <cmath>
 
 #include "plant/ark3.h"
+#include "plant/few.h"
 #include "plant/transitions.h"
 
 namespace shiftrig::plant::detail {
 namespace {
-
-// What the machine loses at an instant, and what it is given [W].
-struct Powers {
-    double lost = 0, given = 0;
-};
 
 // Loss in meshes, from their torques.
 double mesh_losses(const ModelData& m, const Mode& mode, const double* mesh_torques, const double* turning) {
@@ -27,14 +23,17 @@ double mesh_losses(const ModelData& m, const Mode& mode, const double* mesh_torq
     return power[0] + power[1];
 }
 
-double damping_losses(const ModelData& m, const Mode& mode, const double* swing) {
+double flank_damping(const ModelData& m, const Mode& mode, const double* swing) {
     double power = 0;
-    const auto count = static_cast<int>(m.swing_damping.size());
-    const double* damping = m.swing_damping.data();
-    for (int i = 0; i < count; ++i) power += damping[i] * swing[i] * swing[i];
     for (const BacklashLaw& law : m.backlashes) {
         if (is_shaft_closed(m, mode, law.shaft)) power += law.damping * swing[law.shaft] * swing[law.shaft];
     }
+    return power;
+}
+
+double damping_losses(const ModelData& m, const Mode& mode, const double* swing) {
+    double power = flank_damping(m, mode, swing);
+    for (int i = 0; i < m.swings; ++i) power += m.swing_damping[static_cast<std::size_t>(i)] * swing[i] * swing[i];
     return power;
 }
 
@@ -54,28 +53,11 @@ double field_losses(const ModelData& m, const Sample& forces, const double* slip
     return power;
 }
 
-// With the forces of one sample and the motion of another, as the step takes them. The heat of pairs is not in it.
-Powers powers(const ModelData& m, const Mode& mode, const Sample& forces, const Sample& motion,
-              const double* mesh_torques) {
-    const double field = field_losses(m, forces, motion.slip);
-    const double *const f = forces.f, *const slip = motion.slip;
-    double bearings = 0, external = 0;
-    int k = m.pairs;
-    for (const int end = m.first_external; k < end; ++k) bearings += f[k] * slip[k];
-    for (const int end = m.first_flank_force; k < end; ++k) external -= f[k] * slip[k];
-    // What tyres and converters lose goes through external forces: the rest of these is input.
-    return {field + bearings + mesh_losses(m, mode, mesh_torques, motion.turning), external + field};
-}
-
-void subtract(const double* a, const double* b, int count, double* __restrict difference) {
-    for (int i = 0; i < count; ++i) difference[i] = a[i] - b[i];
-}
-
 // Torques of the meshes at `s` if the forces were f: they are linear in them.
 void mesh_torques_with(Work& w, const Mode& mode, const Sample& s, const double* f, double* rows) {
     const ModelData& m = w.model;
     double* const change = w.scratch.vector_b;
-    subtract(f, s.f, m.forces, change);
+    m.kernel.loops.subtract(f, s.f, m.forces, change);
     const int count = padded(mode.row_count + static_cast<int>(m.translating.size()));
     m.kernel.multiply(mode.force_torques, count, m.forces, change, s.active, rows);
 }
@@ -85,16 +67,15 @@ void fill_middle(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
     double* const change = s.vector_b;
-    subtract(s.half.f, s.begin.f, m.forces, change);
-    subtract(s.late.f, s.begin.f, m.forces, change + m.forces);
-    double* q = s.vector_a;
-    m.kernel.multiply(s.used.middle, padded(mode.order), 2 * m.forces, change, s.half.f - mode.order, q);
+    m.kernel.loops.subtract(s.half.f, s.begin.f, m.forces, change);
+    m.kernel.loops.subtract(s.late.f, s.begin.f, m.forces, change + m.forces);
     Sample& middle = s.middle;
+    double* const q = middle.f - mode.order;
+    m.kernel.multiply(s.used.middle, padded(mode.order), 2 * m.forces, change, s.half.f - mode.order, q);
     show(m, mode, q, middle, m.power_rows);
-    std::copy(q, q + mode.order, middle.f - mode.order);
-    std::copy(s.half.f, s.half.f + m.forces, middle.f);
+    copy_few(s.half.f, m.forces, middle.f);
     middle.at = s.half.at;
-    active_torques(m, mode, middle);
+    row_torques(m, mode, middle);
 }
 
 // The parabola through the forces at start, middle and end with which the step was made, at the fraction s.
@@ -132,13 +113,13 @@ void book_finely(Work& w, const Mode& mode) {
         std::copy(at_end, at_end + n, at.f - n);
         show(m, mode, at_end, at, m.power_rows);
         forces_at(s, m.forces, static_cast<double>(part) / parts, at.f);
-        active_torques(m, mode, at);
+        row_torques(m, mode, at);
         const double weight = h / parts / 3 * (part == 0 || part == parts ? 1 : part % 2 ? 4 : 2);  // Simpson
         double loss =
             mesh_losses(m, mode, at.active + mode.first_mesh, at.turning) + damping_losses(m, mode, at.swing);
         for (int k = 0; k < m.first_external; ++k) {
             const double power = at.f[k] * at.slip[k];
-            if (k < m.pairs) s.heat[static_cast<std::size_t>(k)] += weight * power;
+            if (k < m.pairs) s.work[k] += weight * power;
             loss += power;
         }
         s.dissipated += weight * loss;
@@ -168,15 +149,7 @@ void book_finely(Work& w, const Mode& mode) {
 }  // namespace
 
 double stored_energy(const ModelData& m, const double* z) SHIFTRIG_REALTIME {
-    // Four running sums, so that one addition need not wait for the last.
-    double sums[4] = {};
-    const double* stored = m.energy_factor.data();
-    int i = 0;
-    for (; i + 4 <= m.states; i += 4) {
-        for (int lane = 0; lane < 4; ++lane) sums[lane] += stored[i + lane] * z[i + lane] * z[i + lane];
-    }
-    for (int lane = 0; i < m.states; ++i, ++lane) sums[lane] += stored[i] * z[i] * z[i];
-    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+    return m.kernel.loops.weighted_square(m.energy_factor.data(), z, m.states);
 }
 
 double stored_energy(const ModelData& m, const double* z, const unsigned char* contact) SHIFTRIG_REALTIME {
@@ -194,43 +167,50 @@ void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     if (!mode.tree && mode.ledger_parts > 1 && ledger_parts(mode, h / w.h) > 2) return book_finely(w, mode);
 
     // The forces with which the step was made act on the motion that it found: what they do is then what it did.
+    const Sample* const motion[3] = {&begin, &middle, &end};
     const Sample* forces[3] = {&begin, &s.half, &s.late};
-    const double* torques[3];
-    double damping;
+    PowerTerms terms;
+    double damping = 0;  // of the tree's shafts
     if (mode.tree) {
         damping = tree_middle(w, mode);
         forces[1] = &middle;
         forces[2] = &end;
-        const Sample* const samples[3] = {&begin, &middle, &end};
-        for (int i = 0; i < 3; ++i) torques[i] = samples[i]->torque + m.pairs;
+        for (int i = 0; i < 3; ++i) terms.mesh_torque[i] = motion[i]->torque + m.pairs;
     } else {
         fill_middle(w, mode);
-        damping = h / 6 *
-                  (damping_losses(m, mode, begin.swing) + 4 * damping_losses(m, mode, middle.swing) +
-                   damping_losses(m, mode, end.swing));
         double* last = s.vector_c;
         mesh_torques_with(w, mode, end, s.late.f, last);
-        torques[0] = begin.torque + m.pairs;
-        torques[1] = middle.active + mode.first_mesh;
-        torques[2] = last + mode.first_mesh;
+        terms.mesh_torque[0] = begin.torque + m.pairs;
+        terms.mesh_torque[1] = middle.active + mode.first_mesh;
+        terms.mesh_torque[2] = last + mode.first_mesh;
+        terms.damping = m.swing_damping.data();
+        terms.swings = m.swings;
     }
-    const Powers first = powers(m, mode, *forces[0], begin, torques[0]);
-    const Powers half = powers(m, mode, *forces[1], middle, torques[1]);
-    const Powers last = powers(m, mode, *forces[2], end, torques[2]);
-    const double sixth = h / 6;
-    const auto simpson = [sixth](double a, double b, double c) { return sixth * (a + 4 * b + c); };
-    double* __restrict heat = s.vector_b;  // of the pairs in this part
-    for (int k = 0, pairs = m.pairs; k < pairs; ++k) {
-        heat[k] = simpson(forces[0]->f[k] * begin.slip[k], forces[1]->f[k] * middle.slip[k],
-                          forces[2]->f[k] * end.slip[k]);
+    for (int i = 0; i < 3; ++i) {
+        terms.force[i] = forces[i]->f;
+        terms.slip[i] = motion[i]->slip;
+        terms.turning[i] = motion[i]->turning;
+        terms.swing[i] = motion[i]->swing;
     }
-    double heat_of_all = 0;
-    for (int k = 0, pairs = m.pairs; k < pairs; ++k) {
-        s.heat[static_cast<std::size_t>(k)] += heat[k];
-        heat_of_all += heat[k];
+    terms.lost = m.power_lost.data();
+    terms.given = m.power_given.data();
+    terms.forces = m.forces;
+    terms.loss_share = mode.loss_share;
+    terms.meshes = m.meshes;
+    const auto [lost, given] = m.kernel.loops.book(terms, h, s.work);
+    const auto simpson = [h](double a, double b, double c) { return h / 6 * (a + 4 * b + c); };
+    // What tyres and converters lose goes through external forces: the rest of these is input.
+    double field = 0;
+    if (m.loses_in_fields) {
+        field = simpson(field_losses(m, *forces[0], begin.slip), field_losses(m, *forces[1], middle.slip),
+                        field_losses(m, *forces[2], end.slip));
     }
-    s.dissipated += damping + heat_of_all + simpson(first.lost, half.lost, last.lost);
-    s.input_work += simpson(first.given, half.given, last.given);
+    if (!mode.tree && !m.backlashes.empty()) {
+        damping = simpson(flank_damping(m, mode, begin.swing), flank_damping(m, mode, middle.swing),
+                          flank_damping(m, mode, end.swing));
+    }
+    s.dissipated += lost + damping + field;
+    s.input_work += given + field;
     for (std::size_t i = 0; i < m.translating.size(); ++i) {
         const int k = m.translating_force[i];
         w.next[m.layout.distances + static_cast<int>(i)] -=

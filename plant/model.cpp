@@ -1,10 +1,12 @@
 // Builds a Model: indices, laws with their constants, and the names of all signals.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plant/laws/engine.h"
 #include "plant/laws/hydraulics.h"
 #include "plant/laws/oil.h"
+#include "plant/laws/sensor.h"
 #include "plant/laws/tyre.h"
 #include "plant/model_data.h"
 #include "plant/modes.h"
@@ -101,7 +103,6 @@ PairLaw clutch_law(ModelData& m, const Clutch& c, int& actuator_slots) {
     law.stuck = add_input(m, prefix + "stuck", Unit::one, 0, 0, 2, "fault: 1 stuck open, 2 stuck closed");
     if (c.heat) {
         law.heat = &*c.heat;
-        law.heat_operator = heat_operator(*c.heat, h);
     }
     return law;
 }
@@ -132,7 +133,7 @@ void build_laws(ModelData& m) {
         if (pair.kind != PairKind::clutch) law.friction.base = law.friction.static_factor = 1;
         if (law.freewheel >= 0)
             law.friction.base = d.freewheels[static_cast<std::size_t>(pair.source)].sliding_share;
-        if (law.heat) law.temperature = 2 * heated++;
+        if (law.heat) law.temperature = heated++;
         law.sliding_at_rest = sliding_factor(law.friction, 0);
         if (law.source == LoadSource::waveform) m.depends_on_time = true;
         const int k = static_cast<int>(m.pair_laws.size());
@@ -144,7 +145,7 @@ void build_laws(ModelData& m) {
         m.pair_laws.push_back(law);
     }
     m.layout.actuators = actuator_slots;  // sizes for now, offsets in build_layout
-    m.layout.temperatures = 2 * heated;
+    m.layout.temperatures = 2 * whole_panels(heated);
 
     if (!d.engines.empty()) m.throttle = add_input(m, "driver.throttle", Unit::one, 0, 0, 1, "sets the engine's no-load speed");
     for (const BrixiusTyre& tyre : d.tyres) {
@@ -184,8 +185,7 @@ void build_laws(ModelData& m) {
     }
     for (const Plough& plough : d.ploughs) {
         m.draft = add_input(m, "environment.draft", Unit::one, 0, 0, 10, "plough 0 out … 1 in the ground");
-        m.plough_mass.push_back(s.mass(plough.body));
-        m.plough_pair.push_back(s.pair(plough.body + ".resistance"));
+        m.ploughs.push_back({s.mass(plough.body), s.pair(plough.body + ".resistance"), -1, plough_curve(plough)});
     }
     if (d.oil) m.oil_temperature = add_input(m, "environment.oil_temperature", Unit::celsius, d.oil->initial_temperature, -40, 200, "transmission oil");
     for (const SpeedSensor& sensor : d.sensors) {
@@ -274,9 +274,9 @@ void build_sizes(ModelData& m) {
     }
     for (const EngineLaw& engine : m.engines) external(engine.mass);
     for (const SourceLaw& source : m.sources) external(source.mass);
-    for (const auto* masses : {&m.road_mass, &m.plough_mass, &m.translating}) {
-        for (int mass : *masses) external(mass);
-    }
+    for (int mass : m.road_mass) external(mass);
+    for (const PloughLaw& plough : m.ploughs) external(plough.mass);
+    for (int mass : m.translating) external(mass);
     const auto force_on = [&m](int mass) { return m.external_force[static_cast<std::size_t>(mass)]; };
     for (TyreLaw& tyre : m.tyres) {
         tyre.wheel_force = force_on(tyre.wheel);
@@ -289,7 +289,7 @@ void build_sizes(ModelData& m) {
     for (EngineLaw& engine : m.engines) engine.force = force_on(engine.mass);
     for (SourceLaw& source : m.sources) source.force = force_on(source.mass);
     for (int mass : m.road_mass) m.road_force.push_back(force_on(mass));
-    for (int mass : m.plough_mass) m.plough_force.push_back(force_on(mass));
+    for (PloughLaw& plough : m.ploughs) plough.force = force_on(plough.mass);
     for (int mass : m.translating) m.translating_force.push_back(force_on(mass));
     m.first_flank_force = static_cast<int>(m.force_columns.size());
     for (int e = m.plain_shafts; e < m.twists; ++e) {
@@ -309,10 +309,20 @@ void build_sizes(ModelData& m) {
         for (const Elastic& elastic : *elastics)
             m.swing_damping.push_back(elastic.gap > 0 ? 0 : elastic.damping);
     }
+    if (m.description.oil) m.drag_speed_limit = m.description.oil->drag_speed_limit;
     for (const PairLaw& law : m.pair_laws) {
         m.static_factor.push_back(law.friction.static_factor);
         m.sliding_at_rest.push_back(law.sliding_at_rest);
     }
+    for (int k = 0; k < m.forces; ++k) {
+        m.power_lost.push_back(k < m.first_external ? 1 : 0);
+        m.power_given.push_back(k >= m.first_external && k < m.first_flank_force ? 1 : 0);
+    }
+    m.loses_in_fields = !m.tyres.empty() || !m.converters.empty();
+    m.swings = static_cast<int>(m.swing_damping.size());
+    for (auto* numbers : {&m.energy_factor, &m.static_factor, &m.sliding_at_rest, &m.swing_damping,
+                          &m.power_lost, &m.power_given})
+        numbers->resize(numbers->size() + loop_slack, 0.);
 }
 
 // A contact of flanks can be as short as half a period of the lightest motion they allow. The parts of a step have to
@@ -343,6 +353,44 @@ void choose_engine(ModelData& m) {
     }
 }
 
+// Constants of the loops over heated clutches and pick-ups, side by side.
+void build_device_numbers(ModelData& m) {
+    constexpr double never = std::numeric_limits<double>::infinity();
+    const auto panels = [](std::size_t count) { return static_cast<std::size_t>(whole_panels(static_cast<int>(count))); };
+    HeatNumbers& heat = m.heat;
+    for (auto* numbers : {&heat.e11, &heat.e12, &heat.e21, &heat.e22, &heat.f1, &heat.f2})
+        numbers->assign(panels(m.heated_pairs.size()), 0.);
+    heat.warn = heat.fail = std::vector<double>(panels(m.heated_pairs.size()), never);
+    heat.pair.assign(panels(m.heated_pairs.size()), 0);
+    for (std::size_t i = 0; i < m.heated_pairs.size(); ++i) {
+        heat.pair[i] = m.heated_pairs[i];
+        const FacingHeat& p = *m.pair_laws[static_cast<std::size_t>(m.heated_pairs[i])].heat;
+        const HeatOperator op = heat_operator(p, m.options.step_size);
+        heat.e11[i] = op.e11;
+        heat.e12[i] = op.e12;
+        heat.e21[i] = op.e21;
+        heat.e22[i] = op.e22;
+        heat.f1[i] = op.f1;
+        heat.f2[i] = op.f2;
+        if (p.warn_temperature > 0) heat.warn[i] = p.warn_temperature;
+        if (p.fail_temperature > 0) heat.fail[i] = p.fail_temperature;
+    }
+    PickupNumbers& pickups = m.pickups;
+    const std::vector<SpeedSensor>& sensors = m.description.sensors;
+    for (auto* numbers : {&pickups.teeth, &pickups.pitch, &pickups.directional, &pickups.drop_out_speed})
+        numbers->assign(panels(sensors.size()), 0.);
+    pickups.mass.assign(panels(sensors.size()), 0);
+    for (std::size_t i = 0; i < sensors.size(); ++i) {
+        const SpeedSensor& p = sensors[i];
+        pickups.mass[i] = m.sensors[i].mass;
+        if (p.ideal || p.teeth <= 0) continue;
+        pickups.teeth[i] = p.teeth;
+        pickups.pitch[i] = tooth_pitch(p);
+        pickups.directional[i] = p.directional ? 1 : 0;
+        pickups.drop_out_speed[i] = p.drop_out_speed;
+    }
+}
+
 void build_layout(ModelData& m) {
     StateLayout& at = m.layout;
     const int actuators = at.actuators, temperatures = at.temperatures;
@@ -356,9 +404,10 @@ void build_layout(ModelData& m) {
     at.actuators = take(actuators);
     at.heat = take(m.pairs);
     at.temperatures = take(temperatures);
+    at.bulk_temperature = temperatures / 2;
     at.energy = take(3);
     at.engines = take(3 * static_cast<int>(m.engines.size()));
-    at.sensors = take(4 * static_cast<int>(m.sensors.size()));
+    at.sensors = take(4 * whole_panels(static_cast<int>(m.sensors.size())));
     at.tie_up = take(1);
     at.drive_sides = take(m.meshes);
     at.size = next;
@@ -371,37 +420,33 @@ void build_layout(ModelData& m) {
 void build_outputs(ModelData& m) {
     const Description& d = m.description;
     const Structure& s = m.structure;
-    OutputLayout& at = m.output_layout;
     const auto add = [&](const std::string& name, Unit unit, const char* text) { return add_output(m, name, unit, text); };
     for (const Mass& mass : d.masses) {
-        at.mass.push_back(add("mass." + mass.name + ".speed",
-                              mass.motion == Motion::rotating ? Unit::radian_per_second : Unit::metre_per_second, "speed"));
+        add("mass." + mass.name + ".speed",
+            mass.motion == Motion::rotating ? Unit::radian_per_second : Unit::metre_per_second, "speed");
     }
     for (const Shaft& shaft : d.shafts) {
-        at.shaft.push_back(add("shaft." + shaft.name + ".torque", Unit::newton_metre, "torque on the first link"));
+        add("shaft." + shaft.name + ".torque", Unit::newton_metre, "torque on the first link");
         add("shaft." + shaft.name + ".twist", Unit::radian, "twist, positive where the first link is ahead");
     }
-    for (std::size_t k = 0; k < s.pairs.size(); ++k) {
-        const FrictionPair& pair = s.pairs[k];
-        at.pressure.push_back(-1);
-        at.temperature.push_back(-1);
-        if (pair.kind != PairKind::clutch) {
-            at.pair.push_back(-1);
-            continue;
+    // One quantity of all devices after the other: loops write them so.
+    const auto of_clutches = [&](const char* quantity, Unit unit, const char* text, const auto& has) {
+        for (std::size_t k = 0; k < d.clutches.size(); ++k) {
+            if (has(m.pair_laws[k])) add("clutch." + d.clutches[k].name + quantity, unit, text);
         }
-        const std::string prefix = "clutch." + pair.name + ".";
-        at.pair.push_back(add(prefix + "torque", Unit::newton_metre, "torque on the first link"));
-        add(prefix + "slip", Unit::radian_per_second, "slip speed, first link minus second");
-        add(prefix + "capacity", Unit::newton_metre, "sliding capacity at the present slip");
-        add(prefix + "state", Unit::one, "0 locked, 1 slipping, 2 free");
-        add(prefix + "heat_power", Unit::watt, "friction power");
-        add(prefix + "heat", Unit::joule, "friction heat since start");
-        if (m.pair_laws[k].hydraulic) at.pressure[k] = add(prefix + "pressure", Unit::pascal, "chamber pressure");
-        if (m.pair_laws[k].heat) at.temperature[k] = add(prefix + "temperature", Unit::celsius, "facing surface");
-    }
+    };
+    const auto every = [](const PairLaw&) { return true; };
+    of_clutches(".torque", Unit::newton_metre, "torque on the first link", every);
+    of_clutches(".slip", Unit::radian_per_second, "slip speed, first link minus second", every);
+    of_clutches(".capacity", Unit::newton_metre, "sliding capacity at the present slip", every);
+    of_clutches(".state", Unit::one, "0 locked, 1 slipping, 2 free", every);
+    of_clutches(".heat_power", Unit::watt, "friction power", every);
+    of_clutches(".heat", Unit::joule, "friction heat since start", every);
+    of_clutches(".pressure", Unit::pascal, "chamber pressure", [](const PairLaw& law) { return law.hydraulic; });
+    of_clutches(".temperature", Unit::celsius, "facing surface", [](const PairLaw& law) { return law.heat; });
     for (const Freewheel& f : d.freewheels) {
         const std::string prefix = "freewheel." + f.name + ".";
-        at.freewheel.push_back(add(prefix + "torque", Unit::newton_metre, "torque on the first link"));
+        add(prefix + "torque", Unit::newton_metre, "torque on the first link");
         add(prefix + "slip", Unit::radian_per_second, "slip speed, first link minus second");
         add(prefix + "state", Unit::one, "0 locked, 1 overloaded, 2 overrunning");
         add(prefix + "heat_power", Unit::watt, "power of drag or overload");
@@ -409,52 +454,52 @@ void build_outputs(ModelData& m) {
     }
     for (const Backlash& b : d.backlashes) {
         const std::string prefix = "backlash." + b.name + ".";
-        at.backlash.push_back(add(prefix + "torque", Unit::newton_metre, "torque on the first link"));
+        add(prefix + "torque", Unit::newton_metre, "torque on the first link");
         add(prefix + "twist", Unit::radian, "twist, 0 in the middle of the play");
         add(prefix + "state", Unit::one, "0 open, +1 or -1 the flank that is closed");
     }
-    for (const Mesh& mesh : s.meshes) {
-        const std::string prefix = (mesh.planetary ? "row." : "gear.") + mesh.name + ".";
-        if (mesh.planetary) {
-            at.mesh.push_back(add(prefix + "sun", Unit::newton_metre, "torque from the sun into the row"));
-            add(prefix + "ring", Unit::newton_metre, "torque from the ring into the row");
-            add(prefix + "carrier", Unit::newton_metre, "torque from the carrier into the row");
-            add(prefix + "direction", Unit::one, "x: +1 the sun drives, -1 it is driven, 0 at rest");
-        } else {
-            at.mesh.push_back(add(prefix + "torque", Unit::newton_metre, "torque from the first link into the gear"));
-            add(prefix + "direction", Unit::one, "x: +1 the first link drives, -1 it is driven, 0 at rest");
-            add(prefix + "power", Unit::watt, "power into the first link");
-        }
+    for (const Gear& gear : d.gears)
+        add("gear." + gear.name + ".torque", Unit::newton_metre, "torque from the first link into the gear");
+    for (const Gear& gear : d.gears)
+        add("gear." + gear.name + ".direction", Unit::one,
+            "x: +1 the first link drives, -1 it is driven, 0 at rest");
+    for (const Gear& gear : d.gears) add("gear." + gear.name + ".power", Unit::watt, "power into the first link");
+    for (const Planetary& row : d.planetaries) {
+        const std::string prefix = "row." + row.name + ".";
+        add(prefix + "sun", Unit::newton_metre, "torque from the sun into the row");
+        add(prefix + "ring", Unit::newton_metre, "torque from the ring into the row");
+        add(prefix + "carrier", Unit::newton_metre, "torque from the carrier into the row");
+        add(prefix + "direction", Unit::one, "x: +1 the sun drives, -1 it is driven, 0 at rest");
     }
     for (const BrixiusTyre& tyre : d.tyres) {
-        at.tyre.push_back(add("tyre." + tyre.name + ".force", Unit::newton, "force of the wheel on the body"));
+        add("tyre." + tyre.name + ".force", Unit::newton, "force of the wheel on the body");
         add("tyre." + tyre.name + ".slip", Unit::one, "slip, positive when driving");
     }
     for (const TorqueConverter& c : d.converters) {
-        at.converter.push_back(add("converter." + c.name + ".pump_torque", Unit::newton_metre, "from the pump into the converter"));
+        add("converter." + c.name + ".pump_torque", Unit::newton_metre, "from the pump into the converter");
         add("converter." + c.name + ".turbine_torque", Unit::newton_metre, "from the converter to the turbine");
     }
     for (const Engine& e : d.engines) {
-        at.engine.push_back(add("engine." + e.name + ".torque", Unit::newton_metre, "net torque on the crankshaft"));
+        add("engine." + e.name + ".torque", Unit::newton_metre, "net torque on the crankshaft");
         add("engine." + e.name + ".load", Unit::one, "of full load at this speed");
         add("engine." + e.name + ".stalled", Unit::one, "1: stalled");
     }
     for (int j : m.translating) {
         const std::string prefix = "body." + s.mass_names[static_cast<std::size_t>(j)] + ".";
-        at.body.push_back(add(prefix + "acceleration", Unit::metre_per_second2, "acceleration"));
+        add(prefix + "acceleration", Unit::metre_per_second2, "acceleration");
         add(prefix + "distance", Unit::metre, "way since start");
     }
-    for (const Plough& p : d.ploughs) at.plough.push_back(add("plough." + p.name + ".draft", Unit::newton, "force that resists the body"));
-    for (const SpeedSensor& sensor : d.sensors) at.sensor.push_back(add("sensor." + sensor.name + ".speed", Unit::radian_per_second, "reading"));
+    for (const Plough& p : d.ploughs) add("plough." + p.name + ".draft", Unit::newton, "force that resists the body");
+    for (const SpeedSensor& sensor : d.sensors) add("sensor." + sensor.name + ".speed", Unit::radian_per_second, "reading");
     if (d.oil) {
-        at.oil = add("oil.temperature", Unit::celsius, "oil temperature");
+        add("oil.temperature", Unit::celsius, "oil temperature");
         add("oil.viscosity", Unit::one, "dynamic viscosity in Pa s");
     }
-    at.energy = add("energy.input", Unit::joule, "work of engines, sources, grade and air since start");
+    add("energy.input", Unit::joule, "work of engines, sources, grade and air since start");
     add("energy.stored", Unit::joule, "kinetic and strain energy");
     add("energy.dissipated", Unit::joule, "friction, mesh losses, damping, tyres, converters since start");
     add("energy.defect", Unit::joule, "stored minus start minus input plus dissipated");
-    at.certificate = add("certificate.torque_residual", Unit::one, "of the internal torques, relative");
+    add("certificate.torque_residual", Unit::one, "of the internal torques, relative");
     add("certificate.constraint_violation", Unit::one, "worst speed difference across a rigid device, rad/s");
     add("certificate.energy_defect", Unit::joule, "of this step");
     add("certificate.events", Unit::one, "state changes located inside this step");
@@ -486,6 +531,7 @@ Model Model::build(const Description& description, const BuildOptions& options) 
     detail::build_sizes(m);
     detail::bound_step(m);
     detail::choose_engine(m);
+    detail::build_device_numbers(m);
     detail::build_layout(m);
     detail::build_outputs(m);
     for (const FrictionPair& pair : m.structure.pairs) m.device_names.push_back(pair.name);

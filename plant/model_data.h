@@ -13,6 +13,7 @@
 #include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/lag.h"
+#include "plant/laws/plough.h"
 #include "plant/math/table.h"
 #include "plant/plant.h"
 #include "plant/state_layout.h"
@@ -36,10 +37,9 @@ struct PairLaw {
     int actuator = -1;         // offset in the State block
     int delay_slots = 0;       // of a hydraulic actuator
     int command = -1, stuck = -1, valve_stuck = -1, leak = -1;  // inputs
-    int temperature = -1;      // offset in the State block
+    int temperature = -1;      // of the surface, offset in the State block
     int freewheel = -1;        // index into ModelData::freewheels
     const FacingHeat* heat = nullptr;
-    HeatOperator heat_operator;
 };
 
 // Where a law acts on a mass: as f[force], with −slip[force] as the speed of the mass.
@@ -63,17 +63,25 @@ struct SourceLaw {
     int mass = -1, input = -1;
     int force = -1;
 };
+struct PloughLaw {
+    int mass = -1, pair = -1;  // the body, and the friction pair that resists it
+    int force = -1;
+    PloughCurve curve;
+};
 struct SensorLaw {
     int mass = -1;
     int bias = -1, noise = -1, stuck = -1, dropout = -1, missing_teeth = -1;
 };
 
-// Outputs in groups: index of the first signal of each device.
-struct OutputLayout {
-    std::vector<int> mass, shaft, pair, freewheel, backlash, mesh, tyre, converter, engine, body, plough,
-        sensor;
-    std::vector<int> pressure, temperature;  // per pair, −1 if it has none
-    int oil = -1, energy = -1, certificate = -1;
+// Constants of heated clutches and of pick-ups for the loops over all of them (device_loops.h says what they are), in
+// whole panels.
+struct HeatNumbers {
+    std::vector<double> e11, e12, e21, e22, f1, f2, warn, fail;
+    std::vector<int> pair;
+};
+struct PickupNumbers {
+    std::vector<double> teeth, pitch, directional, drop_out_speed;
+    std::vector<int> mass;
 };
 
 struct ModelData {
@@ -109,12 +117,17 @@ struct ModelData {
     bool depends_on_time = false;         // waveforms: forces are no function of state and inputs alone
     std::vector<int> bearing_force;       // per mesh, −1: none
     std::vector<int> external_force;      // per mass, −1: none
+    double drag_speed_limit = 0;          // of open clutches [rad/s]
     double noteworthy_torque = 0;         // 1 % of the weakest clutch: less is idling [Nm]
     std::vector<double> root_inertia;     // √J
+    // For the loops over all devices, so many zeros longer that whole registers can be read:
     std::vector<double> energy_factor;    // by state: J/2, then k/2
-    std::vector<int> translating, translating_force;  // masses
-    std::vector<double> swing_damping;    // of shafts, then dampers
     std::vector<double> static_factor, sliding_at_rest;  // per pair: of its load [1]
+    std::vector<double> swing_damping;    // of shafts, then dampers
+    std::vector<double> power_lost, power_given;  // per force: 1 where its power is lost in a pair or bearing, comes from outside
+    bool loses_in_fields = false;         // there are tyres or converters
+    int swings = 0;                       // shafts and dampers
+    std::vector<int> translating, translating_force;  // masses
     std::unique_ptr<TreeTopology> tree;   // of the engine for long chains; none: dense modes
 
     std::vector<PairLaw> pair_laws;
@@ -128,15 +141,16 @@ struct ModelData {
     std::vector<EngineLaw> engines;
     std::vector<SourceLaw> sources;
     std::vector<int> road_mass, road_force;  // per road
-    std::vector<int> plough_mass, plough_force, plough_pair;  // per plough: body, its force, its resistance
+    std::vector<PloughLaw> ploughs;
     std::vector<SensorLaw> sensors;
+    HeatNumbers heat;
+    PickupNumbers pickups;
     std::vector<double> breakpoints;      // of all waveforms, sorted [s]
 
     std::vector<Signal> inputs, outputs;
     std::map<std::string, int, std::less<>> input_index, output_index;
     std::vector<std::string> device_names;  // friction pairs, meshes, backlashes, engines
     int throttle = -1, brake = -1, grade = -1, draft = -1, oil_temperature = -1;
-    OutputLayout output_layout;
     StateLayout layout;
 };
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "plant/contact.h"
+#include "plant/contact_table.h"
 #include "plant/laws/sensor.h"
 #include "plant/model_data.h"
 #include "plant/samples.h"
@@ -130,11 +131,13 @@ struct OperatorsData {
     std::vector<PairCommand> commands;
     std::vector<double> rest_loads;    // per pair: its load where its actuator has arrived at the command [Nm]
     std::vector<SensorFaults> sensor_faults;
+    bool teeth_missing = false, sensors_disturbed = false;  // some of them
     std::vector<double> source_inputs;  // [Nm]
     std::vector<TyreSoil> soils;
     std::vector<EngineSetting> engine_settings;
     std::vector<double> grade_forces;  // per road [N]
     double draft = 1;                  // share of the plough in the ground
+    ContactTable table;
     bool inputs_known = false;
     // The samples a step begins and ends with. The end of one is the beginning of the next: carried over where
     // State and inputs prove to be those it was computed from.
@@ -142,7 +145,7 @@ struct OperatorsData {
     Sample samples[2];
     int begin_sample = 0;
     bool carried = false;
-    std::vector<double> carried_motion;  // of the State block
+    std::vector<double> carried_engines;  // of the State block
     double carried_energy = 0;           // stored in it [J]
 
     // Hydraulic operators by oil temperature, a pure function of it and h.

@@ -35,7 +35,8 @@ OperatorsData::OperatorsData(const ModelData& m) {
     row_memory.assign(modes.size() * (rows + states), 0);
     link_memory.resize(modes.size() * rows);
     const std::size_t relations = meshes * static_cast<std::size_t>(m.tree ? 0 : m.contact_bytes);
-    share_memory.assign(modes.size() * 2 * meshes, 0.);
+    const std::size_t shares = static_cast<std::size_t>(whole_panels(m.meshes));  // zeros behind the last
+    share_memory.assign(modes.size() * (shares + meshes) + loop_slack, 0.);
     relation_memory.assign(modes.size() * relations, 0);
     for (std::size_t i = 0; i < modes.size(); ++i) {
         modes[i].key = keys.data() + i * 2 * key_bytes;
@@ -43,8 +44,8 @@ OperatorsData::OperatorsData(const ModelData& m) {
         modes[i].rows = row_memory.data() + i * (rows + states);
         modes[i].coordinates = modes[i].rows + rows;
         modes[i].row_links = link_memory.data() + i * rows;
-        modes[i].loss_share = share_memory.data() + i * 2 * meshes;
-        modes[i].family_mobility = modes[i].loss_share + meshes;
+        modes[i].loss_share = share_memory.data() + i * (shares + meshes);
+        modes[i].family_mobility = modes[i].loss_share + shares;
         modes[i].relations = relation_memory.data() + i * relations;
     }
     wanted.assign(key_bytes, 0);
@@ -62,9 +63,9 @@ OperatorsData::OperatorsData(const ModelData& m) {
     sample_memory = aligned_doubles(2 * sample_size(m));
     for (std::size_t i = 0; i < 2; ++i)
         place_sample(m, samples[i], sample_memory.data()->value + i * sample_size(m));
-    carried_motion.assign(
-        static_cast<std::size_t>(m.layout.actuators - m.layout.speeds) + 3 * m.engines.size(), 0.);
+    carried_engines.assign(3 * m.engines.size(), 0.);
     hydraulics.resize(static_cast<std::size_t>(m.pairs));
+    table = ContactTable(m);
 }
 
 void OperatorsData::place_matrices(const ModelData& m) {
@@ -179,7 +180,7 @@ Operators& Operators::operator=(Operators&&) noexcept = default;
 void Operators::drop() noexcept {
     for (detail::Mode& mode : data_->modes) mode.last_use = 0;
     data_->recent = nullptr;
-    data_->oil_known = data_->inputs_known = data_->carried = false;
+    data_->oil_known = data_->inputs_known = data_->carried = data_->table.known = false;
 }
 
 }  // namespace shiftrig::plant

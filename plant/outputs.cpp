@@ -1,6 +1,7 @@
 // Output signals from the end of a step. The order of writing is the order in which model.cpp names them.
 #include <algorithm>
 
+#include "plant/few.h"
 #include "plant/finish.h"
 #include "plant/laws/plough.h"
 #include "plant/ledger.h"
@@ -9,15 +10,17 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-// Of clutches, by PairState.
-constexpr double state_code[] = {0, 1, 1, 2};
-
 // Of a translating mass: those stand behind the torques of the mode's rows.
 double acceleration(Work& w, const Mode& mode, const Sample& s, std::size_t translating) {
     if (!mode.tree) return s.active[static_cast<std::size_t>(mode.row_count) + translating];
     Sample rates = s;
     sample_rate(w, mode, rates);
     return rates.rate[w.model.translating[translating]];
+}
+
+// Which way power goes through a mesh that loses nothing.
+double flow(const Work& w, int mesh, double torque, const double* speeds) {
+    return torque * slip_fast(w.model.mesh_motion[static_cast<std::size_t>(mesh)], speeds) < 0 ? -1 : 1;
 }
 
 }  // namespace
@@ -29,52 +32,59 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
     double* next = w.outputs.value.data();
     const auto put = [&next](auto... values) { ((*next++ = values), ...); };
 
-    next = std::copy(speeds, speeds + m.masses, next);
+    next = copy_few(speeds, m.masses, next);
     const double* twist = speeds + m.masses;
     for (std::size_t e = 0; e < static_cast<std::size_t>(m.plain_shafts); ++e, ++twist) {
         const double rate = mode.tree ? slip_fast(m.shaft_rate[e], speeds) : s.swing[e];
         put(m.structure.shafts[e].stiffness * *twist + m.swing_damping[e] * rate, *twist);
     }
-    const double* heat = block + m.layout.heat;
-    for (int k = 0; k < m.actuated_pairs; ++k, ++heat) {
+    // Clutches are the first pairs.
+    const auto clutches = static_cast<int>(m.description.clutches.size());
+    const ContactTable& table = w.operators.table;
+    const double *const f = s.f, *const torque = s.torque, *const slip = s.slip;
+    const auto put_each = [&next](int count, const auto& value) {
+        for (int k = 0; k < count; ++k) next[k] = value(k);
+        next += count;
+    };
+    next = m.kernel.loops.show_clutches(
+        {f, torque, slip, s.sliding, table.state_code, block + m.layout.heat, clutches}, next);
+    for (const int k : m.hydraulic_pairs) {
         const auto i = static_cast<std::size_t>(k);
-        const PairLaw& law = m.pair_laws[i];
-        const double force = s.f[k], slip = s.slip[k];
-        // Either the sliding force is zero or the internal torque.
-        put(force + s.torque[k], slip, s.sliding[k], state_code[w.contact[k]], force * slip, *heat);
-        if (law.hydraulic) put(block[law.actuator + chamber_slot] * w.operators.commands[i].scale);
-        if (law.heat) put(block[law.temperature]);
+        put(block[m.pair_laws[i].actuator + chamber_slot] * w.operators.commands[i].scale);
     }
+    const double* const surface = block + m.layout.temperatures;
+    next = copy_few(surface, static_cast<int>(m.heated_pairs.size()), next);
     for (const FreewheelLaw& law : m.freewheels) {
         const int k = law.pair;
         const unsigned char state = w.contact[k];
-        const double slip = slip_fast(m.pair_slip[static_cast<std::size_t>(k)], speeds);
-        const double torque = state == locked ? s.torque[k] : s.f[k];
-        put(torque, slip,
+        const double speed = slip_fast(m.pair_slip[static_cast<std::size_t>(k)], speeds);
+        const double passed = state == locked ? torque[k] : f[k];
+        put(passed, speed,
             state == locked                    ? 0.
             : slip_sign(state) * law.sense > 0 ? 1.
                                                : 2.,
-            state == locked ? 0. : torque * slip, block[m.layout.heat + k]);
+            state == locked ? 0. : passed * speed, block[m.layout.heat + k]);
     }
     for (const BacklashLaw& law : m.backlashes) {
         const double side = flank_side(w.contact[law.device]), angle = speeds[m.masses + law.shaft];
         const double rate = slip_fast(m.shaft_rate[static_cast<std::size_t>(law.shaft)], speeds);
         put(side == 0 ? 0. : flank_torque(law, side, angle, rate), angle, side);
     }
-    for (int k = 0; k < m.meshes; ++k) {
-        const auto i = static_cast<std::size_t>(k);
-        const Mesh& mesh = m.structure.meshes[i];
-        const double torque = s.torque[m.pairs + k];
-        int x = mode.bound[m.pairs + k] ? 0 : loss_exponent(w.contact[m.pairs + k]);
-        if (mesh.planetary) {
-            const double u = mesh.force_ratio(x), lost = s.torque[m.pairs + m.meshes + k];
-            put(torque, -u * torque + mesh.ratio * lost, -(1 - u) * torque - mesh.ratio * lost);
-        } else {
-            put(torque);
-        }
-        if (!m.lossy[i]) x = torque * slip_fast(m.mesh_motion[i], speeds) < 0 ? -1 : 1;
-        put(static_cast<double>(x));
-        if (!mesh.planetary) put(torque * speeds[mesh.first]);
+    // Gears are the first meshes.
+    const auto gears = static_cast<int>(m.description.gears.size());
+    const double *const mesh_torque = torque + m.pairs, *const direction = table.direction;
+    next = copy_few(mesh_torque, gears, next);
+    const unsigned char* const lossy = m.lossy.data();
+    put_each(gears, [&](int k) {
+        return lossy[k] ? direction[k] : flow(w, k, mesh_torque[k], speeds);
+    });
+    const Mesh* const meshes = m.structure.meshes.data();
+    put_each(gears, [&](int k) { return mesh_torque[k] * speeds[meshes[k].first]; });
+    for (int k = gears; k < m.meshes; ++k) {
+        const double u = meshes[k].force_ratio(static_cast<int>(direction[k])), sun = mesh_torque[k];
+        const double lost = meshes[k].ratio * torque[m.pairs + m.meshes + k];
+        put(sun, -u * sun + lost, -(1 - u) * sun - lost,
+            lossy[k] ? direction[k] : flow(w, k, sun, speeds));
     }
     for (std::size_t t = 0; t < m.tyres.size(); ++t) put(s.tyre_force[t], s.tyre_slip[t]);
     for (std::size_t c = 0; c < m.converters.size(); ++c) put(s.converter[2 * c], s.converter[2 * c + 1]);
@@ -88,17 +98,17 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
     for (std::size_t i = 0; i < m.translating.size(); ++i) {
         put(acceleration(w, mode, s, i), block[m.layout.distances + static_cast<int>(i)]);
     }
-    for (std::size_t p = 0; p < m.plough_mass.size(); ++p) {
+    for (const PloughLaw& law : m.ploughs) {
         // Its share of what resists the body.
-        const int pair = m.plough_pair[p];
+        const int pair = law.pair;
         const double force = w.contact[pair] == locked ? s.torque[pair] : s.f[pair];
-        const double share = m.draft < 0 ? 1 : w.operators.input[static_cast<std::size_t>(m.draft)];
-        const double draft = plough_draft(m.description.ploughs[p], speeds[m.plough_mass[p]], share);
+        const double draft = plough_draft(law.curve, speeds[law.mass], w.operators.draft);
         put(s.sliding[pair] > 0 ? force * draft / s.sliding[pair] : 0.);
     }
-    for (std::size_t i = 0; i < m.sensors.size(); ++i) {
-        const double* sensor = block + m.layout.sensors + 4 * static_cast<int>(i);
-        put(w.operators.sensor_faults[i].dropout ? 0. : sensor[3]);
+    const double* shown = sensor_slots(m.layout, m.sensors.size(), block).output;
+    for (const SensorFaults& faults : w.operators.sensor_faults) {
+        put(faults.dropout ? 0. : *shown);
+        ++shown;
     }
     if (m.description.oil) put(w.operators.oil_temperature, w.operators.oil.viscosity);
 

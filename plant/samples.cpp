@@ -14,29 +14,30 @@ std::size_t sample_size(const ModelData& m) {
     const std::size_t doubles =
         static_cast<std::size_t>(whole_panels(m.seen) + whole_panels(m.torques + translating) +
                                  whole_panels(m.states_padded) + m.states + m.forces + 2 * m.auxiliary +
-                                 3 * m.pairs + m.torques) +
+                                 m.pairs + 2 * whole_panels(m.pairs) + m.torques + loop_slack) +
         2 * m.tyres.size() + 2 * m.converters.size() + 2 * m.engines.size();
     return (doubles + panel_rows - 1) / panel_rows * panel_rows;
 }
 
 void place_sample(const ModelData& m, Sample& s, double* memory) {
     const auto take = [&memory](std::size_t doubles) { return std::exchange(memory, memory + doubles); };
-    const auto pairs = static_cast<std::size_t>(m.pairs), auxiliary = static_cast<std::size_t>(m.auxiliary);
+    const auto pairs = static_cast<std::size_t>(m.pairs),
+               padded_pairs = static_cast<std::size_t>(whole_panels(m.pairs)),
+               auxiliary = static_cast<std::size_t>(m.auxiliary);
     s.slip =
         take(static_cast<std::size_t>(whole_panels(m.seen)));  // what products write begins on cache lines
     s.motion = s.slip + m.forces;
     s.turning = s.slip + m.law_rows;
     s.swing = s.turning + m.meshes;
     s.z = s.slip + m.power_rows;
-    s.active =
-        take(static_cast<std::size_t>(whole_panels(m.torques + static_cast<int>(m.translating.size()))));
     s.rate = take(static_cast<std::size_t>(whole_panels(m.states_padded)));
     s.f = take(static_cast<std::size_t>(m.states + m.forces)) + m.states;
+    s.active = take(static_cast<std::size_t>(whole_panels(m.torques + static_cast<int>(m.translating.size()))));
     s.auxiliary = take(auxiliary);
     s.auxiliary_rate = take(auxiliary);
     s.load = take(pairs);
-    s.sliding = take(pairs);
-    s.holding = take(pairs);
+    s.sliding = take(padded_pairs);
+    s.holding = take(padded_pairs);
     s.torque = take(static_cast<std::size_t>(m.torques));
     s.tyre_force = take(m.tyres.size());
     s.tyre_slip = take(m.tyres.size());
@@ -53,8 +54,7 @@ ScratchData::ScratchData(const ModelData& m) {
         place_sample(m, *samples[i], buffer.data()->value + i * size);
     loads.resize(static_cast<std::size_t>(m.pairs));
     held.assign(static_cast<std::size_t>(m.pairs), 0.);
-    for (auto* list : {&moving, &busy, &sliding, &dragging})
-        list->assign(static_cast<std::size_t>(m.pairs), 0);
+    for (auto* list : {&moving, &busy}) list->assign(static_cast<std::size_t>(m.pairs), 0);
     moves.assign(static_cast<std::size_t>(m.pairs), 0);
     engine_modes.resize(m.engines.size());
     const auto bytes = static_cast<std::size_t>(m.contact_bytes);
@@ -69,7 +69,8 @@ ScratchData::ScratchData(const ModelData& m) {
     vector_b = vector_a + longest;
     vector_c = vector_b + longest;
     torque_copy.assign(static_cast<std::size_t>(m.torques), 0.);
-    heat.assign(static_cast<std::size_t>(m.pairs), 0.);
+    works = aligned_doubles(static_cast<std::size_t>(m.forces) + loop_slack);
+    work = works.data()->value;
     workspace.assign(static_cast<std::size_t>(m.tree ? TreeWork::doubles(m) : workspace_doubles(m)), 0.);
     if (m.tree) return;
     workspace_index.assign(static_cast<std::size_t>(workspace_integers(m)), 0);
@@ -88,10 +89,10 @@ Scratch& Scratch::operator=(Scratch&&) noexcept = default;
 void Scratch::fill_with_nan() noexcept {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     detail::ScratchData& s = *data_;
-    for (auto* numbers : {&s.torque_copy, &s.heat, &s.held, &s.workspace}) {
+    for (auto* numbers : {&s.torque_copy, &s.held, &s.workspace}) {
         std::fill(numbers->begin(), numbers->end(), nan);
     }
-    for (auto* lines : {&s.buffer, &s.vectors, &s.operator_memory, &s.ledger_memory}) {
+    for (auto* lines : {&s.buffer, &s.vectors, &s.works, &s.operator_memory, &s.ledger_memory}) {
         for (detail::CacheLine& line : *lines) std::fill(std::begin(line.value), std::end(line.value), nan);
     }
     for (detail::PairLoad& load : s.loads) {

@@ -30,7 +30,7 @@ struct Sample {
     // What operators multiply: q ends where f begins (`coordinates`), f is followed by the torques of the mode's
     // active rows. A product that gives q comes before f is filled, since its padding reaches into it.
     double* f = nullptr;       // forces
-    double* active = nullptr;  // torques in the order of Mode::rows, then accelerations of translating masses
+    double* active = nullptr;  // behind f: torques in the order of Mode::rows, then accelerations of translating masses
     double* auxiliary = nullptr;
     double* auxiliary_rate = nullptr;
     double* load = nullptr;              // per pair: what presses it together [Nm]
@@ -81,9 +81,6 @@ struct ScratchData {
     std::vector<int> moving;           // the pairs whose load does
     std::vector<int> busy;             // the pairs whose valve or piston does not rest with the command
     int moving_count = 0;
-    std::vector<int> sliding,
-        dragging;  // pairs that pass a torque while a part is under way: pressed, by their oil
-    int sliding_count = 0, dragging_count = 0;
     std::vector<EngineMode> engine_modes;                                    // at the beginning of the step
     std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
     std::vector<unsigned char> overcome;  // per pair: broke away in the instant being settled
@@ -92,7 +89,8 @@ struct ScratchData {
     double *vector_a = nullptr, *vector_b = nullptr,
            *vector_c = nullptr;  // padded masses, torques, forces, or three blocks
     std::vector<double> torque_copy;
-    std::vector<double> heat;               // per pair in this step [J]
+    AlignedDoubles works;
+    double* work = nullptr;                 // per force in this step, what it takes out: of pairs, their heat [J]
     double dissipated = 0, input_work = 0;  // in this step [J]
     double stored_before = 0, stored = 0;   // at its beginning, at its end [J]
     double viscosity = 0, oil_temperature = 0;

@@ -7,6 +7,7 @@
 #include "plant/contact.h"
 #include "plant/laws/engine.h"
 #include "plant/laws/hydraulics.h"
+#include "plant/laws/sensor.h"
 #include "plant/ledger.h"
 #include "plant/model_data.h"
 
@@ -86,7 +87,8 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
             }
             default: break;
         }
-        if (law.temperature >= 0) block[law.temperature] = block[law.temperature + 1] = input(m.oil_temperature);
+        if (law.temperature >= 0)
+            block[law.temperature] = block[law.temperature + m.layout.bulk_temperature] = input(m.oil_temperature);
     }
     for (int k : locked) contact[k] = detail::locked;
     for (int k = 0; k < m.meshes; ++k) {
@@ -123,12 +125,12 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
         auxiliary[0] = torque_demand(engine, engine_setting(engine, law.peak, in), speed, full, 1);
         auxiliary[1] = full > 0 ? std::clamp(auxiliary[0] / full, 0., 1.) : 0;
     }
+    const detail::SensorSlots sensor_slots = detail::sensor_slots(m.layout, m.sensors.size(), block);
     for (std::size_t i = 0; i < m.sensors.size(); ++i) {
-        double* at = block + m.layout.sensors + 4 * static_cast<int>(i);
         const SpeedSensor& sensor = m.description.sensors[i];
         const double speed = speeds[m.sensors[i].mass];
-        at[1] = 1e9;
-        at[2] = at[3] = sensor.ideal || sensor.directional ? speed : std::fabs(speed);
+        sensor_slots.since_edge[i] = SensorState{}.since_edge;
+        sensor_slots.reading[i] = sensor_slots.output[i] = sensor.ideal || sensor.directional ? speed : std::fabs(speed);
     }
     double* energy = block + m.layout.energy;
     energy[0] = energy[1] = 0;

@@ -8,10 +8,10 @@
 //   contact               one byte per pair and mesh (contact.h)
 //   actuators             per clutch as its actuation needs
 //   heat                  per friction pair, since start      [J]
-//   temperature           surface, bulk per heated clutch     [°C]
+//   temperature           surfaces of heated clutches, then their bulks, in whole panels (kernels.h) each   [°C]
 //   energy                input, dissipated, stored at start  [J]
 //   engine                mode, cranking time [s], last start input
-//   sensor                4 per sensor (laws/sensor.h)
+//   sensor                positions, times since the last tooth, readings, outputs (laws/sensor.h), whole panels each
 //   tie-up                1 while a torque split is not unique
 //   drive side            of each mesh as last told: x, 0 never
 #pragma once
@@ -19,6 +19,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "plant/kernels.h"
 #include "plant/laws/hydraulics.h"
 
 namespace shiftrig::plant::detail {
@@ -27,6 +28,7 @@ struct StateLayout {
     static constexpr int header = 4;
     int speeds = 0, twists = 0, distances = 0, auxiliary = 0, contact = 0, actuators = 0, heat = 0,
         temperatures = 0, energy = 0, engines = 0, sensors = 0, tie_up = 0, drive_sides = 0, size = 0;
+    int bulk_temperature = 0;  // from a clutch's surface to its bulk
 };
 
 inline std::int64_t read_integer(const double* slot) noexcept {
@@ -36,8 +38,21 @@ inline std::int64_t read_integer(const double* slot) noexcept {
 }
 inline void write_integer(double* slot, std::int64_t value) noexcept { std::memcpy(slot, &value, sizeof value); }
 
+// What all pick-ups remember, side by side.
+template <typename Number>
+struct SensorSlotsOf {
+    Number *position, *since_edge, *reading, *output;
+};
+using SensorSlots = SensorSlotsOf<double>;
+template <typename Number>
+SensorSlotsOf<Number> sensor_slots(const StateLayout& layout, std::size_t sensors, Number* block) noexcept {
+    const int panel = whole_panels(static_cast<int>(sensors));
+    Number* const at = block + layout.sensors;
+    return {at, at + panel, at + 2 * panel, at + 3 * panel};
+}
+
 // A hydraulic actuator: its state, then the delay line.
-constexpr int hydraulic_slots = 8, chamber_slot = 6;
+constexpr int hydraulic_slots = 8, chamber_slot = 6, steady_slot = 7;
 inline HydraulicState read_hydraulic(const double* at) noexcept {
     return {at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7]};
 }

@@ -25,7 +25,7 @@ void close_device(Work& w, int device, Sample& s) {
     const Mode& mode = find_mode(m, w.operators, w.contact, w.scratch);
     const double lost = join(w, mode, s.z);
     w.scratch.dissipated += lost;
-    if (device < m.pairs) w.scratch.heat[static_cast<std::size_t>(device)] += lost;
+    if (device < m.pairs) w.scratch.work[device] += lost;
     // What came to rest with it: the same motion, hence the same instant.
     for (int k = 0; k < m.pairs; ++k) {
         if (slips(w.contact[k]) && mode.bound[k] && !was_bound[k]) set(k);

@@ -76,9 +76,11 @@ struct EngineSetting {
     double no_load_speed = 0;  // [rad/s]
     double most = 0;           // torque limit [Nm]
     bool fuel_cut = false;
+    double actuator_rate = 0, turbo_rate = 0;  // 1/lag, 0 where there is none [1/s]
 };
 inline EngineSetting engine_setting(const Engine& p, double peak, const EngineInput& input) noexcept {
-    return {no_load_speed(p, input), input.torque_limit * peak, input.fuel_cut};
+    const auto rate = [](double lag) { return lag > 0 ? 1 / lag : 0; };
+    return {no_load_speed(p, input), input.torque_limit * peak, input.fuel_cut, rate(p.actuator_lag), rate(p.turbo_lag)};
 }
 
 inline double torque_demand(const Engine& p, const EngineSetting& set, double speed, double full, double boost) noexcept {
@@ -91,32 +93,31 @@ inline double torque_demand(const Engine& p, const EngineSetting& set, double sp
     return std::max(-friction, std::min(wanted, upper));
 }
 
-// Derivatives while running; a lag of 0 gives 0 (engine_torque then takes the demand itself). `full` is the full load
-// at this speed.
-inline EngineState engine_rate(const Engine& p, const EngineSetting& set, const EngineState& state, double speed,
-                               double full) noexcept {
-    EngineState rate;
-    if (p.actuator_lag > 0)
-        rate.torque =
-            (torque_demand(p, set, speed, full, state.boost) - state.torque) / p.actuator_lag;
-    if (p.turbo_lag > 0) {
-        const double load = full > 0 && state.torque > 0 ? std::min(state.torque / full, 1.) : 0;
-        rate.boost = (load - state.boost) / p.turbo_lag;
-    }
-    return rate;
-}
-
 inline double starter_torque(const Engine& p) noexcept {
     return 0.5 * interpolate(p.full_load, p.fade_from);
 }
 
-// Torque of the engine on its mass, without the friction device of the stalled one.
-inline double engine_torque(const Engine& p, const EngineSetting& set, const EngineState& state, EngineMode mode,
-                            double speed, double full) noexcept {
-    if (mode == EngineMode::stalled) return 0;
-    if (mode == EngineMode::cranking) return starter_torque(p);
-    if (p.actuator_lag > 0) return state.torque;
-    return torque_demand(p, set, speed, full, state.boost);
+// Torque of the engine on its mass, without the friction device of the stalled one, and derivatives of its state; a lag
+// of 0 gives 0, the torque is the demand itself then. `full` is the full load at this speed.
+struct EngineDrive {
+    double torque = 0;  // [Nm]
+    EngineState rate;   // [Nm/s], [1/s]
+};
+inline EngineDrive engine_drive(const Engine& p, const EngineSetting& set, const EngineState& state, EngineMode mode,
+                                double speed, double full) noexcept {
+    EngineDrive drive;
+    if (mode != EngineMode::running) {
+        if (mode == EngineMode::cranking) drive.torque = starter_torque(p);
+        return drive;
+    }
+    const double demand = torque_demand(p, set, speed, full, state.boost);
+    drive.torque = set.actuator_rate > 0 ? state.torque : demand;
+    drive.rate.torque = (demand - state.torque) * set.actuator_rate;
+    if (set.turbo_rate > 0) {
+        const double load = full > 0 && state.torque > 0 ? std::min(state.torque / full, 1.) : 0;
+        drive.rate.boost = (load - state.boost) * set.turbo_rate;
+    }
+    return drive;
 }
 
 inline double stalled_friction_capacity(const Engine& p, EngineMode mode, double speed) noexcept {

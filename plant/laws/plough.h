@@ -18,11 +18,24 @@
 
 namespace shiftrig::plant {
 
+// The same per share in the ground over the speed itself: D = a + |v| (b + |v| c).
+struct PloughCurve {
+    double a = 0;  // [N]
+    double b = 0;  // [N s/m]
+    double c = 0;  // [N s²/m²]
+};
+inline PloughCurve plough_curve(const Plough& p) noexcept {
+    const double cut = p.soil_factor * p.width * (100 * p.depth);  // [m cm]
+    return {cut * p.a, 3.6 * cut * p.b, 3.6 * 3.6 * cut * p.c};
+}
+
 // Draft capacity at body speed v [m/s], scaled by `share` 0 (out) … 1 (in the ground). [N], ≥ 0.
+inline double plough_draft(const PloughCurve& curve, double v, double share) noexcept {
+    const double speed = std::fabs(v);
+    return share * (curve.a + speed * (curve.b + speed * curve.c));
+}
 inline double plough_draft(const Plough& p, double v, double share) noexcept {
-    const double kmh = 3.6 * std::fabs(v);
-    const double depth_cm = 100 * p.depth;
-    return share * p.soil_factor * (p.a + kmh * (p.b + kmh * p.c)) * p.width * depth_cm;
+    return plough_draft(plough_curve(p), v, share);
 }
 
 }  // namespace shiftrig::plant

@@ -63,6 +63,10 @@ inline double noise(std::uint64_t seed, std::uint64_t stream, std::uint64_t coun
     return std::sqrt(-2 * log(u)) * cos(2 * pi * v);
 }
 
+inline double tooth_pitch(const SpeedSensor& p) noexcept {
+    return 2 * pi / p.teeth;  // [rad]
+}
+
 // The pick-up over one step, with the wheel's speed at its start and end.
 inline void advance_pickup(const SpeedSensor& p, SensorState& state, double begin, double end, double h,
                            int missing_teeth = 0) noexcept {
@@ -71,7 +75,7 @@ inline void advance_pickup(const SpeedSensor& p, SensorState& state, double begi
         return;
     }
     const double teeth = p.teeth;
-    const double pitch = 2 * pi / teeth;
+    const double pitch = tooth_pitch(p);
     const double travel = 0.5 * (begin + end) * h / pitch;  // [teeth]
     const double from = state.position, to = from + travel;
     const bool forward = travel >= 0;

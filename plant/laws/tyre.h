@@ -33,11 +33,12 @@ struct TyreSoil {
     double grip = 0;                 // largest F [N]
     double resistance = 0;           // W/Bn [N]
     double resistance_per_slip = 0;  // 0.5 W/√Bn [N]
+    double per_length = 0;           // 1/σ [1/m]
 };
 
 inline TyreSoil tyre_soil(const BrixiusTyre& p, double mobility_number) noexcept {
     return {0.88 * (1 - exp(-0.1 * mobility_number)) * p.weight, p.weight / mobility_number,
-            0.5 * p.weight / std::sqrt(mobility_number)};
+            0.5 * p.weight / std::sqrt(mobility_number), 1 / p.relaxation_length};
 }
 
 // κ̇ and the slip s that the force sees.
@@ -46,12 +47,12 @@ struct TyreMotion {
     double slip = 0;  // [1]
 };
 
-inline TyreMotion tyre_motion(const BrixiusTyre& p, double kappa, double wheel_speed, double body_speed) noexcept {
+inline TyreMotion tyre_motion(const BrixiusTyre& p, const TyreSoil& soil, double kappa, double wheel_speed,
+                              double body_speed) noexcept {
     const double rim = wheel_speed * p.radius;
     const double rolling = std::max(std::fabs(rim), std::fabs(body_speed));
-    const double rate = (rim - body_speed - rolling * kappa) / p.relaxation_length;
-    const double damping =
-        p.slip_damping_time * p.relaxation_length / (p.relaxation_length + p.slip_damping_time * rolling);
+    const double rate = (rim - body_speed - rolling * kappa) * soil.per_length;
+    const double damping = p.slip_damping_time / (1 + p.slip_damping_time * rolling * soil.per_length);
     return {rate, kappa + damping * rate};
 }
 

@@ -1,0 +1,76 @@
+#include "plant/contact_table.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "plant/devices.h"
+
+namespace shiftrig::plant::detail {
+
+ContactTable::ContactTable(const ModelData& m)
+    : pressed(static_cast<std::size_t>(m.pairs)),
+      contact(static_cast<std::size_t>(m.contact_bytes)),
+      held(static_cast<std::size_t>(m.pairs)) {
+    const int pairs = whole_panels(m.pairs), meshes = whole_panels(m.meshes);
+    numbers = aligned_doubles(static_cast<std::size_t>(m.law_rows + 2 * pairs + 3 * meshes) + loop_slack);
+    double* at = numbers.data()->value;
+    const auto take = [&at](int doubles) { return std::exchange(at, at + doubles); };
+    sense = take(m.law_rows);
+    drag = take(pairs);
+    state_code = take(pairs);
+    drive = take(meshes);
+    drive_offset = take(meshes);
+    direction = take(meshes);
+}
+
+namespace {
+
+constexpr double state_codes[] = {0, 1, 1, 2};  // of PairState
+
+}  // namespace
+
+void doubt_table(Work& w) SHIFTRIG_REALTIME {
+    ContactTable& table = w.operators.table;
+    const ScratchData& s = w.scratch;
+    bool same = !table.moving && s.moving_count == 0 && table.viscosity == w.operators.oil.viscosity;
+    const double *const was = table.held.data(), *const is = s.held.data();
+    for (int k = 0, count = w.model.actuated_pairs; k < count; ++k) same &= was[k] == is[k];
+    table.known = table.known && same;
+}
+
+void tabulate_contact(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+    ContactTable& table = w.operators.table;
+    if (table.known && std::memcmp(table.contact.data(), w.contact, table.contact.size()) == 0) return;
+    const ModelData& m = w.model;
+    const ScratchData& s = w.scratch;
+    table.known = true;
+    table.moving = s.moving_count != 0;
+    table.viscosity = w.operators.oil.viscosity;
+    std::copy(s.held.begin(), s.held.end(), table.held.begin());
+    std::copy(w.contact, w.contact + m.contact_bytes, table.contact.begin());
+    table.pressed_count = 0;
+    for (int k = 0; k < m.pairs; ++k) {
+        const unsigned char state = w.contact[k];
+        const auto i = static_cast<std::size_t>(k);
+        table.sense[k] = slip_sign(state);
+        table.drag[k] = state == free_running ? m.pair_laws[i].drag * table.viscosity : 0;
+        table.state_code[k] = state_codes[state];
+        const bool pressed = s.held[i] != 0 || s.moves[i] || k >= m.actuated_pairs;
+        if (state != locked && pressed) table.pressed[static_cast<std::size_t>(table.pressed_count++)] = k;
+    }
+    for (int k = 0; k < m.meshes; ++k) {
+        const unsigned char state = w.contact[m.pairs + k];
+        const bool rests = state == stuck || mode.bound[m.pairs + k];
+        const bool lossy = m.lossy[static_cast<std::size_t>(k)] != 0;
+        const double sign = motion_sign(state), x = loss_exponent(state);
+        const bool checked = lossy && !rests;
+        table.drive[k] = checked ? sign * x : 0;
+        table.drive_offset[k] = checked ? loss_kink(w, k, sign) * (sign * x) : 0;
+        table.direction[k] = rests ? 0 : x;
+        // A tree has no motions in its view.
+        if (!mode.tree) table.sense[m.forces + k] = checked ? sign : 0;
+    }
+}
+
+}  // namespace shiftrig::plant::detail

@@ -1,0 +1,197 @@
+// The loops of device_loops.h for whatever registers an including file has: that defines `lanes`, the doubles of one
+// register, then includes this inside its own namespace.
+//
+// Comparisons are written so that what is not a number counts as no violation, and what stands behind an array as nothing.
+
+using Lanes = double __attribute__((vector_size(8 * lanes)));
+using Marks = std::int64_t __attribute__((vector_size(8 * lanes)));
+
+inline Lanes read(const double* p) noexcept {
+    Lanes v;
+    __builtin_memcpy(&v, p, sizeof v);
+    return v;
+}
+inline void write(double* p, const Lanes& v) noexcept {
+    __builtin_memcpy(p, &v, sizeof v);
+}
+inline Lanes magnitude(const Lanes& v) noexcept {
+    return reinterpret_cast<Lanes>(reinterpret_cast<Marks>(v) & INT64_MAX);
+}
+inline Lanes where(const Marks& marks, const Lanes& v) noexcept {  // 0 elsewhere
+    return reinterpret_cast<Lanes>(reinterpret_cast<Marks>(v) & marks);
+}
+inline bool any(const Marks& marks) noexcept {
+    std::int64_t all = 0;
+    for (int i = 0; i < lanes; ++i) all |= marks[i];
+    return all != 0;
+}
+inline double sum(const Lanes& v) noexcept {
+    double total = v[0];
+    for (int i = 1; i < lanes; ++i) total += v[i];
+    return total;
+}
+// The largest whole numbers not above v, |v| < 2^51.
+inline Lanes whole_below(const Lanes& v) noexcept {
+    constexpr double shift = 0x1.8p52;
+    const Lanes nearest = (v + shift) - shift;
+    return nearest > v ? nearest - 1. : nearest;
+}
+
+inline Lanes gather(const double* from, const int* index) noexcept {
+    Lanes v;
+    for (int i = 0; i < lanes; ++i) v[i] = from[index[i]];
+    return v;
+}
+
+bool senses_hold(const SpeedCheck& c) SHIFTRIG_REALTIME {
+    Marks broken = {};
+    for (int i = 0; i < c.speeds; i += lanes) broken |= read(c.sense + i) * read(c.end + i) < 0;
+    return !any(broken);
+}
+
+bool may_dip(const SpeedCheck& c) SHIFTRIG_REALTIME {
+    Marks close = {};
+    for (int i = 0; i < c.speeds; i += lanes) {
+        // The parabola through three margins: falling at first, rising at last.
+        const Lanes sense = read(c.sense + i);
+        const Lanes g0 = sense * read(c.begin + i), gm = sense * read(c.half + i), g1 = sense * read(c.end + i);
+        close |= (4. * gm - 3. * g0 - g1 < 0) & (g0 - 4. * gm + 3. * g1 > 0) & (g1 > 0);
+    }
+    return any(close);
+}
+
+void press(const double* load, const double* static_factor, const double* sliding_factor, int pairs, double* holding,
+           double* sliding) SHIFTRIG_REALTIME {
+    for (int k = 0; k < pairs; k += lanes) {
+        const Lanes pressed = read(load + k);
+        write(holding + k, pressed * read(static_factor + k));
+        write(sliding + k, pressed * read(sliding_factor + k));
+    }
+}
+
+void drag(const double* factor, double limit, const double* slip, int pairs, double* f) SHIFTRIG_REALTIME {
+    const Lanes most = Lanes{} + limit;
+    for (int k = 0; k < pairs; k += lanes) {
+        const Lanes v = read(slip + k), capped = v > most ? most : v;
+        write(f + k, read(factor + k) * (capped < -most ? -most : capped));
+    }
+}
+
+Work3 book(const PowerTerms& t, double h, double* work) SHIFTRIG_REALTIME {
+    const double sixth = h / 6;
+    Lanes lost = {}, given = {};
+    for (int k = 0; k < t.forces; k += lanes) {
+        const Lanes part = sixth * (read(t.force[0] + k) * read(t.slip[0] + k) +
+                                    4. * (read(t.force[1] + k) * read(t.slip[1] + k)) +
+                                    read(t.force[2] + k) * read(t.slip[2] + k));
+        write(work + k, read(work + k) + part);
+        lost += where(read(t.lost + k) != 0, part);
+        given -= where(read(t.given + k) != 0, part);
+    }
+    Lanes rest = {};
+    for (int k = 0; k < t.meshes; k += lanes) {
+        const Lanes share = read(t.loss_share + k);
+        const Lanes power = read(t.mesh_torque[0] + k) * read(t.turning[0] + k) +
+                            4. * (read(t.mesh_torque[1] + k) * read(t.turning[1] + k)) +
+                            read(t.mesh_torque[2] + k) * read(t.turning[2] + k);
+        rest += where(share != 0, share * power);
+    }
+    for (int i = 0; i < t.swings; i += lanes) {
+        const Lanes damping = read(t.damping + i);
+        const Lanes a = read(t.swing[0] + i), b = read(t.swing[1] + i), c = read(t.swing[2] + i);
+        rest += where(damping != 0, damping * (a * a + 4. * (b * b) + c * c));
+    }
+    return {sum(lost) + sixth * sum(rest), sum(given)};
+}
+
+void subtract(const double* a, const double* b, int count, double* difference) SHIFTRIG_REALTIME {
+    for (int i = 0; i < count; i += lanes) write(difference + i, read(a + i) - read(b + i));
+}
+
+inline double square(const double* v, int count) noexcept {
+    alignas(64) static constexpr std::int64_t here[16] = {-1, -1, -1, -1, -1, -1, -1, -1};
+    Lanes sums = {};
+    for (; count > 0; count -= lanes, v += lanes) {
+        Marks counted;
+        __builtin_memcpy(&counted, here + 8 - (count < lanes ? count : lanes), sizeof counted);
+        const Lanes value = where(counted, read(v));
+        sums += value * value;
+    }
+    return sum(sums);
+}
+
+double share_of_squares(const double* rest, int rests, const double* v, int count) SHIFTRIG_REALTIME {
+    const double all = square(v, count);
+    return all > 0 ? square(rest, rests) / all : 0;
+}
+
+double weighted_square(const double* weight, const double* v, int count) SHIFTRIG_REALTIME {
+    Lanes sums = {};
+    for (int i = 0; i < count; i += lanes) {
+        const Lanes factor = read(weight + i), value = read(v + i);
+        sums += where(factor != 0, factor * value * value);
+    }
+    return sum(sums);
+}
+
+bool heat(const HeatTerms& t, const double* work, double rate, double oil, double* surface, double* bulk,
+          double* before) SHIFTRIG_REALTIME {
+    Marks passed = {};
+    for (int k = 0; k < t.count; k += lanes) {
+        const Lanes old = read(surface + k), s = old - oil, b = read(bulk + k) - oil;
+        const Lanes p = gather(work, t.pair + k) * rate;
+        const Lanes now = oil + read(t.e11 + k) * s + read(t.e12 + k) * b + read(t.f1 + k) * p;
+        write(bulk + k, oil + read(t.e21 + k) * s + read(t.e22 + k) * b + read(t.f2 + k) * p);
+        write(surface + k, now);
+        write(before + k, old);
+        const Lanes warn = read(t.warn + k), fail = read(t.fail + k);
+        passed |= ((old < warn) & (now >= warn)) | ((old < fail) & (now >= fail));
+    }
+    return any(passed);
+}
+
+void pick_up(const PickupTerms& t, const double* begin, const double* end, double h, double* position,
+             double* since_edge, double* reading) SHIFTRIG_REALTIME {
+    for (int i = 0; i < t.count; i += lanes) {
+        const Lanes teeth = read(t.teeth + i), pitch = read(t.pitch + i), last_speed = gather(end, t.mass + i);
+        const Lanes travel = 0.5 * (gather(begin, t.mass + i) + last_speed) * h / pitch;  // [teeth]
+        const Lanes from = read(position + i), to = from + travel;
+        // Backwards, the same with both ends turned round.
+        const Marks backward = travel < 0;
+        const Lanes first = whole_below(backward ? -from : from) + 1.;
+        const Lanes last = whole_below(backward ? -to : to);
+        const Lanes count = last - first + 1.;
+        const Lanes last_time = h * ((last - (backward ? -from : from)) / magnitude(travel));
+        const Lanes since = read(since_edge + i), old = read(reading + i), waited = since + h;
+        const Lanes measured = count * pitch / (since + last_time);
+        const Marks turned = backward & (read(t.directional + i) != 0), seen = count > 0, ideal = teeth == 0;
+        Lanes value = turned ? -measured : measured;
+        if (any(~seen & ~ideal)) {
+            const Lanes limit = pitch / waited, faded = magnitude(old) > limit ? (old < 0 ? -limit : limit) : old;
+            value = seen ? value : faded;
+        }
+        const Lanes shown = magnitude(value) < read(t.drop_out_speed + i) ? Lanes{} : value;
+        const Marks inside = (to >= 0) & (to < teeth);
+        Lanes place = to;
+        if (any(~inside & ~ideal)) place = inside ? to : to - teeth * whole_below(to / teeth);
+        write(reading + i, ideal ? last_speed : shown);
+        write(since_edge + i, ideal ? since : seen ? h - last_time : waited);
+        write(position + i, ideal ? from : place);
+    }
+}
+
+double* show_clutches(const ClutchValues& c, double* next) SHIFTRIG_REALTIME {
+    double *const torque = next, *const slip = torque + c.count, *const capacity = slip + c.count,
+                 *const state = capacity + c.count, *const power = state + c.count, *const heat = power + c.count;
+    // In this order: what is written behind the last of one is the beginning of the next.
+    for (int k = 0; k < c.count; k += lanes) write(torque + k, read(c.force + k) + read(c.torque + k));
+    for (int k = 0; k < c.count; k += lanes) write(slip + k, read(c.slip + k));
+    for (int k = 0; k < c.count; k += lanes) write(capacity + k, read(c.capacity + k));
+    for (int k = 0; k < c.count; k += lanes) write(state + k, read(c.state_code + k));
+    for (int k = 0; k < c.count; k += lanes) write(power + k, read(c.force + k) * read(c.slip + k));
+    for (int k = 0; k < c.count; k += lanes) write(heat + k, read(c.heat + k));
+    return heat + c.count;
+}
+
+constexpr DeviceLoops device_loops{senses_hold, may_dip, press, drag, book, subtract, share_of_squares,
+                                   weighted_square, heat, pick_up, show_clutches};

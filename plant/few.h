@@ -1,0 +1,27 @@
+// A few doubles copied, cleared, compared in place: memmove, memset and memcmp would be called for no more than a
+// register or two, and their wide reads wait for the narrow writes just before them.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+
+namespace shiftrig::plant::detail {
+
+// Returns where it ends.
+inline double* copy_few(const double* from, int count, double* to) noexcept {
+    for (int i = 0; i < count; ++i) to[i] = from[i];
+    return to + count;
+}
+
+inline void clear_few(double* from, double* end) noexcept {
+    while (from < end) *from++ = 0;
+}
+
+// The same, bit for bit?
+inline bool same_bits(const double* a, const double* b, int count) noexcept {
+    std::uint64_t different = 0;
+    for (int i = 0; i < count; ++i) different |= std::bit_cast<std::uint64_t>(a[i]) ^ std::bit_cast<std::uint64_t>(b[i]);
+    return different == 0;
+}
+
+}  // namespace shiftrig::plant::detail
