@@ -166,7 +166,8 @@ double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     ScratchData& s = w.scratch;
     const TreeMode& t = *mode.tree;
     TreeWork v(m, s.workspace.data());
-    const double h = s.end.at.time - s.begin.at.time;  // begin's groups are those that advance_tree started from
+    const double h =
+        s.end.at.time - s.begin.at.time;  // begin's groups are those that advance_tree started from
     const MiddleSums sums{h,
                           {v.begin.speed, v.end.speed},
                           {v.begin.torque, v.end.torque},

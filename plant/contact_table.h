@@ -22,13 +22,14 @@ struct ContactTable {
     // By row of the view, as far as force laws read it: the sign of the speed that a slipping pair or a moving lossy mesh
     // keeps, 0 for all others.
     double* sense = nullptr;
-    double* drag = nullptr;          // per pair: torque per slip of an open clutch in its oil [Nm s/rad]
-    double* state_code = nullptr;    // per pair, as outputs show it
+    double* drag = nullptr;        // per pair: torque per slip of an open clutch in its oil [Nm s/rad]
+    double* state_code = nullptr;  // per pair, as outputs show it
     // Per mesh: power flows as assumed where drive · M_1 − drive_offset is not negative; 0 for those without losses or at rest.
     double* drive = nullptr;
     double* drive_offset = nullptr;
-    double* direction = nullptr;     // per mesh, as outputs show it: x, 0 at rest; of lossless ones left to their torque
-    std::vector<int> pressed;        // pairs that slip, or are about to, under a load
+    double* direction =
+        nullptr;  // per mesh, as outputs show it: x, 0 at rest; of lossless ones left to their torque
+    std::vector<int> pressed;  // pairs that slip, or are about to, under a load
     int pressed_count = 0;
 
     // What it was made from.

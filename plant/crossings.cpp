@@ -71,12 +71,15 @@ bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
     if (mode.rests || some_pair_strained(w, mode, 1, end) || !m.kernel.loops.senses_hold(speed_check(w)))
         return false;
     const ContactTable& table = w.operators.table;
-    const double *const drive = table.drive, *const offset = table.drive_offset, *const torque = end.torque + m.pairs;
+    const double *const drive = table.drive, *const offset = table.drive_offset,
+                        *const torque = end.torque + m.pairs;
     bool turned = false;
     for (int k = 0, meshes = m.meshes; k < meshes; ++k) turned |= drive[k] * torque[k] - offset[k] < 0;
     if (turned || !mode.tree) return !turned;
     for (const int k : m.lossy_meshes) {  // a tree has no motions in its view
-        if (motion_sign(w.contact[m.pairs + k]) * slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z) < 0)
+        if (motion_sign(w.contact[m.pairs + k]) *
+                slip_fast(m.mesh_motion[static_cast<std::size_t>(k)], end.z) <
+            0)
             return false;
     }
     return true;

@@ -27,7 +27,7 @@ struct PowerTerms {
     const double* loss_share = nullptr;  // per mesh, 0 where nothing is lost
     const double *mesh_torque[3] = {}, *turning[3] = {};
     int meshes = 0;
-    const double* damping = nullptr;     // per shaft and damper
+    const double* damping = nullptr;  // per shaft and damper
     const double* swing[3] = {};
     int swings = 0;
 };
@@ -39,17 +39,17 @@ struct Work3 {
 struct HeatTerms {
     const double *e11 = nullptr, *e12 = nullptr, *e21 = nullptr, *e22 = nullptr, *f1 = nullptr, *f2 = nullptr;
     const double *warn = nullptr, *fail = nullptr;  // limits [°C], infinite where there are none
-    const int* pair = nullptr;  // whose work heats it
+    const int* pair = nullptr;                      // whose work heats it
     int count = 0;
 };
 
 // Periods of so many pick-ups (laws/sensor.h), none with missing teeth.
 struct PickupTerms {
-    const double* teeth = nullptr;         // of the wheel; 0: an ideal one
-    const double* pitch = nullptr;         // 2π/teeth [rad]
-    const double* directional = nullptr;   // 1 or 0
+    const double* teeth = nullptr;        // of the wheel; 0: an ideal one
+    const double* pitch = nullptr;        // 2π/teeth [rad]
+    const double* directional = nullptr;  // 1 or 0
     const double* drop_out_speed = nullptr;
-    const int* mass = nullptr;             // whose speed it measures
+    const int* mass = nullptr;  // whose speed it measures
     int count = 0;
 };
 
@@ -69,23 +69,26 @@ struct DeviceLoops {
     void (*press)(const double* load, const double* static_factor, const double* sliding_factor, int pairs,
                   double* holding, double* sliding) SHIFTRIG_REALTIME = nullptr;
     // f = factor · slip, slip within ± limit.
-    void (*drag)(const double* factor, double limit, const double* slip, int pairs, double* f) SHIFTRIG_REALTIME = nullptr;
+    void (*drag)(const double* factor, double limit, const double* slip, int pairs,
+                 double* f) SHIFTRIG_REALTIME = nullptr;
     // Over h; adds the work of each force to work[k].
     Work3 (*book)(const PowerTerms& terms, double h, double* work) SHIFTRIG_REALTIME = nullptr;
-    void (*subtract)(const double* a, const double* b, int count, double* difference) SHIFTRIG_REALTIME = nullptr;
+    void (*subtract)(const double* a, const double* b, int count,
+                     double* difference) SHIFTRIG_REALTIME = nullptr;
     // Σ rest² / Σ v², 0 where v is
-    double (*share_of_squares)(const double* rest, int rests, const double* v, int count) SHIFTRIG_REALTIME = nullptr;
+    double (*share_of_squares)(const double* rest, int rests, const double* v,
+                               int count) SHIFTRIG_REALTIME = nullptr;
     // Σ weight · v², weight 0 behind the last
     double (*weighted_square)(const double* weight, const double* v, int count) SHIFTRIG_REALTIME = nullptr;
     // With the work of each pair and the rate 1/h. Leaves in `before` what the surfaces were; true if one has passed a
     // limit upwards.
-    bool (*heat)(const HeatTerms& terms, const double* work, double rate, double oil, double* surface, double* bulk,
-                 double* before) SHIFTRIG_REALTIME = nullptr;
+    bool (*heat)(const HeatTerms& terms, const double* work, double rate, double oil, double* surface,
+                 double* bulk, double* before) SHIFTRIG_REALTIME = nullptr;
     // From the speeds of all masses at begin and end of the step; position, time since the last tooth, reading are its state.
-    void (*pick_up)(const PickupTerms& terms, const double* begin, const double* end, double h, double* position,
-                    double* since_edge, double* reading) SHIFTRIG_REALTIME = nullptr;
+    void (*pick_up)(const PickupTerms& terms, const double* begin, const double* end, double h,
+                    double* position, double* since_edge, double* reading) SHIFTRIG_REALTIME = nullptr;
     // Torque, slip, capacity, state, friction power and heat, of all clutches one after the other; returns where it ends.
-    double* (*show_clutches)(const ClutchValues& values, double* next) SHIFTRIG_REALTIME = nullptr;
+    double* (*show_clutches)(const ClutchValues& values, double* next)SHIFTRIG_REALTIME = nullptr;
 };
 
 }  // namespace shiftrig::plant::detail

@@ -54,14 +54,15 @@ bool may_dip(const SpeedCheck& c) SHIFTRIG_REALTIME {
     for (int i = 0; i < c.speeds; i += lanes) {
         // The parabola through three margins: falling at first, rising at last.
         const Lanes sense = read(c.sense + i);
-        const Lanes g0 = sense * read(c.begin + i), gm = sense * read(c.half + i), g1 = sense * read(c.end + i);
+        const Lanes g0 = sense * read(c.begin + i), gm = sense * read(c.half + i),
+                    g1 = sense * read(c.end + i);
         close |= (4. * gm - 3. * g0 - g1 < 0) & (g0 - 4. * gm + 3. * g1 > 0) & (g1 > 0);
     }
     return any(close);
 }
 
-void press(const double* load, const double* static_factor, const double* sliding_factor, int pairs, double* holding,
-           double* sliding) SHIFTRIG_REALTIME {
+void press(const double* load, const double* static_factor, const double* sliding_factor, int pairs,
+           double* holding, double* sliding) SHIFTRIG_REALTIME {
     for (int k = 0; k < pairs; k += lanes) {
         const Lanes pressed = read(load + k);
         write(holding + k, pressed * read(static_factor + k));
@@ -153,7 +154,8 @@ bool heat(const HeatTerms& t, const double* work, double rate, double oil, doubl
 void pick_up(const PickupTerms& t, const double* begin, const double* end, double h, double* position,
              double* since_edge, double* reading) SHIFTRIG_REALTIME {
     for (int i = 0; i < t.count; i += lanes) {
-        const Lanes teeth = read(t.teeth + i), pitch = read(t.pitch + i), last_speed = gather(end, t.mass + i);
+        const Lanes teeth = read(t.teeth + i), pitch = read(t.pitch + i),
+                    last_speed = gather(end, t.mass + i);
         const Lanes travel = 0.5 * (gather(begin, t.mass + i) + last_speed) * h / pitch;  // [teeth]
         const Lanes from = read(position + i), to = from + travel;
         // Backwards, the same with both ends turned round.
@@ -167,7 +169,8 @@ void pick_up(const PickupTerms& t, const double* begin, const double* end, doubl
         const Marks turned = backward & (read(t.directional + i) != 0), seen = count > 0, ideal = teeth == 0;
         Lanes value = turned ? -measured : measured;
         if (any(~seen & ~ideal)) {
-            const Lanes limit = pitch / waited, faded = magnitude(old) > limit ? (old < 0 ? -limit : limit) : old;
+            const Lanes limit = pitch / waited,
+                        faded = magnitude(old) > limit ? (old < 0 ? -limit : limit) : old;
             value = seen ? value : faded;
         }
         const Lanes shown = magnitude(value) < read(t.drop_out_speed + i) ? Lanes{} : value;
@@ -182,7 +185,8 @@ void pick_up(const PickupTerms& t, const double* begin, const double* end, doubl
 
 double* show_clutches(const ClutchValues& c, double* next) SHIFTRIG_REALTIME {
     double *const torque = next, *const slip = torque + c.count, *const capacity = slip + c.count,
-                 *const state = capacity + c.count, *const power = state + c.count, *const heat = power + c.count;
+                  *const state = capacity + c.count, *const power = state + c.count,
+                  *const heat = power + c.count;
     // In this order: what is written behind the last of one is the beginning of the next.
     for (int k = 0; k < c.count; k += lanes) write(torque + k, read(c.force + k) + read(c.torque + k));
     for (int k = 0; k < c.count; k += lanes) write(slip + k, read(c.slip + k));
@@ -193,5 +197,5 @@ double* show_clutches(const ClutchValues& c, double* next) SHIFTRIG_REALTIME {
     return heat + c.count;
 }
 
-constexpr DeviceLoops device_loops{senses_hold, may_dip, press, drag, book, subtract, share_of_squares,
-                                   weighted_square, heat, pick_up, show_clutches};
+constexpr DeviceLoops device_loops{senses_hold,      may_dip,         press, drag,    book,         subtract,
+                                   share_of_squares, weighted_square, heat,  pick_up, show_clutches};

@@ -20,7 +20,8 @@ inline void clear_few(double* from, double* end) noexcept {
 // The same, bit for bit?
 inline bool same_bits(const double* a, const double* b, int count) noexcept {
     std::uint64_t different = 0;
-    for (int i = 0; i < count; ++i) different |= std::bit_cast<std::uint64_t>(a[i]) ^ std::bit_cast<std::uint64_t>(b[i]);
+    for (int i = 0; i < count; ++i)
+        different |= std::bit_cast<std::uint64_t>(a[i]) ^ std::bit_cast<std::uint64_t>(b[i]);
     return different == 0;
 }
 

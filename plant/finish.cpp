@@ -31,7 +31,8 @@ bool is_carried(const ModelData& m, const OperatorsData& o, const double* block)
     const StateLayout& at = m.layout;
     const Sample& s = o.samples[0];
     // The step ended with the table up to date.
-    return same_bits(s.z, block + at.speeds, m.states) && same_bits(s.auxiliary, block + at.auxiliary, m.auxiliary) &&
+    return same_bits(s.z, block + at.speeds, m.states) &&
+           same_bits(s.auxiliary, block + at.auxiliary, m.auxiliary) &&
            std::memcmp(o.table.contact.data(), block + at.contact, o.table.contact.size()) == 0 &&
            same_bits(o.carried_engines.data(), block + at.engines, 3 * static_cast<int>(m.engines.size()));
 }
@@ -51,8 +52,9 @@ void advance_temperatures(Work& w) {
     if (count == 0) return;
     double* const before = w.scratch.vector_b;
     const HeatNumbers& heat = m.heat;
-    const HeatTerms terms{heat.e11.data(), heat.e12.data(), heat.e21.data(),  heat.e22.data(),  heat.f1.data(),
-                          heat.f2.data(),  heat.warn.data(), heat.fail.data(), heat.pair.data(), count};
+    const HeatTerms terms{
+        heat.e11.data(), heat.e12.data(),  heat.e21.data(),  heat.e22.data(),  heat.f1.data(),
+        heat.f2.data(),  heat.warn.data(), heat.fail.data(), heat.pair.data(), count};
     double* const surface = w.next + m.layout.temperatures;
     if (!m.kernel.loops.heat(terms, w.scratch.work, 1 / w.h, input(w, m.oil_temperature), surface,
                              surface + m.layout.bulk_temperature, before))
@@ -128,7 +130,8 @@ void advance_sensors(Work& w, const double* end_speeds) {
         const PickupNumbers& p = m.pickups;
         const PickupTerms terms{p.teeth.data(),          p.pitch.data(), p.directional.data(),
                                 p.drop_out_speed.data(), p.mass.data(),  count};
-        m.kernel.loops.pick_up(terms, begin_speeds, end_speeds, w.h, slots.position, slots.since_edge, slots.reading);
+        m.kernel.loops.pick_up(terms, begin_speeds, end_speeds, w.h, slots.position, slots.since_edge,
+                               slots.reading);
     }
     if (w.operators.sensors_disturbed) {
         disturb_readings(w, slots);
@@ -150,7 +153,8 @@ double torque_residual(Work& w, const Mode& mode, const Sample& s) {
 
 double constraint_violation(const Mode& mode, const double* speeds) {
     double worst = 0;
-    for (int r = 0; r < mode.row_count; ++r) worst = std::max(worst, std::fabs(slip_fast(mode.row_links[r], speeds)));
+    for (int r = 0; r < mode.row_count; ++r)
+        worst = std::max(worst, std::fabs(slip_fast(mode.row_links[r], speeds)));
     return worst;
 }
 
@@ -180,7 +184,8 @@ void report_changes(Work& w, const Mode& mode) {
             members += std::ldexp(1., k);
             first = k;
         }
-        if (first >= 0) log_event(w, EventKind::tie_up, first, end, s.torque[first], s.holding[first], members);
+        if (first >= 0)
+            log_event(w, EventKind::tie_up, first, end, s.torque[first], s.holding[first], members);
     }
     tie_up = mode.redundant ? 1 : 0;
     if (w.outputs.certificate.fall_backs > 0) log_event(w, EventKind::fall_back, -1, end, 0, 0, 0);

@@ -145,7 +145,8 @@ void law_forces(const Work& w, Sample& s) noexcept {
     const TyreSoil* soil = known.soils.data();
     double *tyre_slip = s.tyre_slip, *traction = s.tyre_force;
     for (const TyreLaw& law : m.tyres) {
-        const TyreMotion motion = tyre_motion(*tyre, *soil, *auxiliary++, -slip[law.wheel_force], -slip[law.body_force]);
+        const TyreMotion motion =
+            tyre_motion(*tyre, *soil, *auxiliary++, -slip[law.wheel_force], -slip[law.body_force]);
         *rate++ = motion.rate;
         *tyre_slip++ = motion.slip;
         const double force = tyre_force(*soil, motion.slip);
@@ -192,14 +193,16 @@ void law_forces(const Work& w, Sample& s) noexcept {
     for (const SourceLaw& law : m.sources) {
         double torque = *told++;
         if (!source->waveform.pieces.empty()) torque += waveform(source->waveform, s.at.time, s.at.side);
-        if (source->quadratic != 0) torque += source->quadratic * slip[law.force] * std::fabs(slip[law.force]);
+        if (source->quadratic != 0)
+            torque += source->quadratic * slip[law.force] * std::fabs(slip[law.force]);
         f[law.force] += torque;
         ++source;
     }
     const Road* road = d.roads.data();
     const double* grade = known.grade_forces.data();
     for (const int force : m.road_force) f[force] += *grade++ + air_force(*road++, -slip[force]);
-    for (const PloughLaw& law : m.ploughs) load[law.pair] += plough_draft(law.curve, -slip[law.force], known.draft);
+    for (const PloughLaw& law : m.ploughs)
+        load[law.pair] += plough_draft(law.curve, -slip[law.force], known.draft);
 }
 
 }  // namespace
@@ -240,11 +243,13 @@ void end_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     load_pairs(w, s);
     open_drags(w, s);
     law_forces(w, s);
-    m.kernel.loops.press(s.load, m.static_factor.data(), m.sliding_at_rest.data(), m.pairs, s.holding, s.sliding);
+    m.kernel.loops.press(s.load, m.static_factor.data(), m.sliding_at_rest.data(), m.pairs, s.holding,
+                         s.sliding);
     for (int i = 0; i < table.pressed_count; ++i) {
         const int k = table.pressed[static_cast<std::size_t>(i)];
         if (s.load[k] == 0) continue;
-        s.sliding[k] = sliding_capacity(m.pair_laws[static_cast<std::size_t>(k)].friction, s.load[k], s.slip[k]);
+        s.sliding[k] =
+            sliding_capacity(m.pair_laws[static_cast<std::size_t>(k)].friction, s.load[k], s.slip[k]);
         s.f[k] = table.sense[k] * s.sliding[k];
     }
     freewheel_forces(w, w.contact, s);

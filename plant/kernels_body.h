@@ -25,13 +25,15 @@ inline void sum_panels(std::integer_sequence<int, index...>, const double* p, in
 }
 
 template <typename... Panels>
-inline void multiply_panels(const double* p, int columns, const double* v, const double* y0, double* y) noexcept {
+inline void multiply_panels(const double* p, int columns, const double* v, const double* y0,
+                            double* y) noexcept {
     sum_panels(std::make_integer_sequence<int, sizeof...(Panels)>{}, p, columns, v, y0, y, Panels{}...);
 }
 
 // rows × columns, rows known.
 template <int rows>
-void product(const double* panel, int, int columns, const double* v, const double* y0, double* y) SHIFTRIG_REALTIME {
+void product(const double* panel, int, int columns, const double* v, const double* y0,
+             double* y) SHIFTRIG_REALTIME {
     constexpr int whole = rows / panel_rows < most_panels ? rows / panel_rows : most_panels;
     constexpr int here = rows < whole * panel_rows + panel_rows ? rows : whole * panel_rows;
     if constexpr (here == 4) multiply_panels<Four>(panel, columns, v, y0, y);
@@ -45,16 +47,21 @@ void product(const double* panel, int, int columns, const double* v, const doubl
 }
 
 SHIFTRIG_TRUSTED_BEGIN  // the compiler cannot see through a function handed on
-void tall_product(const double* panel, int rows, int columns, const double* v, const double* y0,
-                  double* y) SHIFTRIG_REALTIME {
+    void
+    tall_product(const double* panel, int rows, int columns, const double* v, const double* y0,
+                 double* y) SHIFTRIG_REALTIME {
     constexpr int most = 4 * short_products;
     constexpr Multiply rest[] = {product<4>, product<8>, product<12>, product<16>, product<20>, product<24>};
     int r = 0;
-    for (; r + most < rows; r += most) product<most>(panel + r * columns, 0, columns, v, y0 ? y0 + r : nullptr, y + r);
+    for (; r + most < rows; r += most)
+        product<most>(panel + r * columns, 0, columns, v, y0 ? y0 + r : nullptr, y + r);
     rest[(rows - r) / 4 - 1](panel + r * columns, 0, columns, v, y0 ? y0 + r : nullptr, y + r);
 }
 SHIFTRIG_TRUSTED_END
 
 Kernel kernel_of(KernelKind kind, const char* name) {
-    return {kind, name, {product<4>, product<8>, product<12>, product<16>, product<20>, product<24>, tall_product}, device_loops};
+    return {kind,
+            name,
+            {product<4>, product<8>, product<12>, product<16>, product<20>, product<24>, tall_product},
+            device_loops};
 }

@@ -33,7 +33,8 @@ double flank_damping(const ModelData& m, const Mode& mode, const double* swing) 
 
 double damping_losses(const ModelData& m, const Mode& mode, const double* swing) {
     double power = flank_damping(m, mode, swing);
-    for (int i = 0; i < m.swings; ++i) power += m.swing_damping[static_cast<std::size_t>(i)] * swing[i] * swing[i];
+    for (int i = 0; i < m.swings; ++i)
+        power += m.swing_damping[static_cast<std::size_t>(i)] * swing[i] * swing[i];
     return power;
 }
 

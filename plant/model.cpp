@@ -15,8 +15,8 @@ namespace shiftrig::plant {
 namespace detail {
 namespace {
 
-int add_input(ModelData& m, const std::string& name, Unit unit, double initial, double minimum, double maximum,
-              const std::string& description) {
+int add_input(ModelData& m, const std::string& name, Unit unit, double initial, double minimum,
+              double maximum, const std::string& description) {
     const auto [at, fresh] = m.input_index.emplace(name, static_cast<int>(m.inputs.size()));
     if (fresh) m.inputs.push_back({name, unit, initial, minimum, maximum, description});
     return at->second;
@@ -65,7 +65,8 @@ PairLaw clutch_law(ModelData& m, const Clutch& c, int& actuator_slots) {
     if (const auto* direct = std::get_if<ActuationDirect>(&c.actuation)) {
         if (direct->profile.pieces.empty()) {
             law.source = LoadSource::input;
-            law.command = add_input(m, prefix + "engagement", Unit::one, direct->initial, 0, 1e6, "share of the nominal capacity");
+            law.command = add_input(m, prefix + "engagement", Unit::one, direct->initial, 0, 1e6,
+                                    "share of the nominal capacity");
         } else {
             law.source = LoadSource::waveform;
             law.profile = &direct->profile;
@@ -74,14 +75,16 @@ PairLaw clutch_law(ModelData& m, const Clutch& c, int& actuator_slots) {
     } else if (const auto* release = std::get_if<ActuationRelease>(&c.actuation)) {
         law.source = LoadSource::release;
         law.lag = lag_operator(release->lag, h);
-        law.command = add_input(m, prefix + "release_command", Unit::one, release->initial, 0, 1, "0 closed … 1 released");
+        law.command = add_input(m, prefix + "release_command", Unit::one, release->initial, 0, 1,
+                                "0 closed … 1 released");
         actuator_slots += 1;
     } else if (const auto* apply = std::get_if<ActuationApply>(&c.actuation)) {
         law.source = LoadSource::apply;
         law.lag = lag_operator(apply->lag, h);
         law.command = apply->by_driver_brake
                           ? add_input(m, "driver.brake", Unit::one, apply->initial, 0, 1, "service brake")
-                          : add_input(m, prefix + "application_command", Unit::one, apply->initial, 0, 1, "0 open … 1 applied");
+                          : add_input(m, prefix + "application_command", Unit::one, apply->initial, 0, 1,
+                                      "0 open … 1 applied");
         actuator_slots += 1;
     } else if (const auto* hydraulic = std::get_if<ActuationHydraulic>(&c.actuation)) {
         law.source = LoadSource::hydraulic;
@@ -89,13 +92,15 @@ PairLaw clutch_law(ModelData& m, const Clutch& c, int& actuator_slots) {
         law.full_load = load_from_pressure(law.friction, hydraulic->maximum_pressure);
         law.command =
             hydraulic->solenoid
-                ? add_input(m, prefix + "current_command", Unit::ampere, current_for(*hydraulic->solenoid, hydraulic->initial),
-                            0, hydraulic->solenoid->pressure_over_current.back().first, "solenoid current")
+                ? add_input(m, prefix + "current_command", Unit::ampere,
+                            current_for(*hydraulic->solenoid, hydraulic->initial), 0,
+                            hydraulic->solenoid->pressure_over_current.back().first, "solenoid current")
                 : add_input(m, prefix + "pressure_command", Unit::pascal, hydraulic->initial, 0,
                             hydraulic->maximum_pressure, "valve pressure wanted");
         law.valve_stuck = add_switch(m, prefix + "valve_stuck", "fault: 1 holds the valve's outlet pressure");
         law.leak = add_switch(m, prefix + "leak", "fault: share of the chamber pressure lost");
-        law.delay_slots = static_cast<int>(delay_slots(*hydraulic, m.description.oil ? &*m.description.oil : nullptr, h));
+        law.delay_slots =
+            static_cast<int>(delay_slots(*hydraulic, m.description.oil ? &*m.description.oil : nullptr, h));
         actuator_slots += hydraulic_slots + law.delay_slots;
     } else {
         law.source = LoadSource::constant;
@@ -114,7 +119,9 @@ void build_laws(ModelData& m) {
     for (const FrictionPair& pair : s.pairs) {
         PairLaw law;
         switch (pair.kind) {
-            case PairKind::clutch: law = clutch_law(m, d.clutches[static_cast<std::size_t>(pair.source)], actuator_slots); break;
+            case PairKind::clutch:
+                law = clutch_law(m, d.clutches[static_cast<std::size_t>(pair.source)], actuator_slots);
+                break;
             case PairKind::freewheel: {
                 const Freewheel& f = d.freewheels[static_cast<std::size_t>(pair.source)];
                 law.source = LoadSource::rated;
@@ -127,8 +134,12 @@ void build_laws(ModelData& m) {
                 law.source = LoadSource::rolling;
                 law.full_load = rolling_moment(d.tyres[static_cast<std::size_t>(pair.source)]);
                 break;
-            case PairKind::body_resistance: law.source = LoadSource::resistance; break;
-            case PairKind::engine_friction: law.source = LoadSource::engine; break;
+            case PairKind::body_resistance:
+                law.source = LoadSource::resistance;
+                break;
+            case PairKind::engine_friction:
+                law.source = LoadSource::engine;
+                break;
         }
         if (pair.kind != PairKind::clutch) law.friction.base = law.friction.static_factor = 1;
         if (law.freewheel >= 0)
@@ -147,16 +158,19 @@ void build_laws(ModelData& m) {
     m.layout.actuators = actuator_slots;  // sizes for now, offsets in build_layout
     m.layout.temperatures = 2 * whole_panels(heated);
 
-    if (!d.engines.empty()) m.throttle = add_input(m, "driver.throttle", Unit::one, 0, 0, 1, "sets the engine's no-load speed");
+    if (!d.engines.empty())
+        m.throttle = add_input(m, "driver.throttle", Unit::one, 0, 0, 1, "sets the engine's no-load speed");
     for (const BrixiusTyre& tyre : d.tyres) {
         TyreLaw law;
         law.wheel = s.mass(tyre.wheel);
         law.body = s.mass(tyre.body);
-        law.mobility = add_input(m, "environment.mobility_number", Unit::one, tyre.mobility_number, 1, 1e4, "Brixius number of the soil");
+        law.mobility = add_input(m, "environment.mobility_number", Unit::one, tyre.mobility_number, 1, 1e4,
+                                 "Brixius number of the soil");
         law.resistance = s.pair(tyre.body + ".resistance");
         m.tyres.push_back(law);
     }
-    for (const TorqueConverter& c : d.converters) m.converters.push_back({s.mass(c.pump), s.mass(c.turbine), -1, -1});
+    for (const TorqueConverter& c : d.converters)
+        m.converters.push_back({s.mass(c.pump), s.mass(c.turbine), -1, -1});
     for (const Engine& e : d.engines) {
         const std::string prefix = "engine." + e.name + ".";
         EngineLaw law;
@@ -165,8 +179,10 @@ void build_laws(ModelData& m) {
         law.peak = largest_value(e.full_load);
         law.full_load = Curve(e.full_load);
         law.start = add_switch(m, prefix + "start", "rising edge starts a stalled engine");
-        law.speed_request_enable = add_switch(m, prefix + "speed_request_enable", "1: hold the speed request");
-        law.speed_request = add_input(m, prefix + "speed_request", Unit::radian_per_second, 0, 0, 1e4, "speed control");
+        law.speed_request_enable =
+            add_switch(m, prefix + "speed_request_enable", "1: hold the speed request");
+        law.speed_request =
+            add_input(m, prefix + "speed_request", Unit::radian_per_second, 0, 0, 1e4, "speed control");
         law.torque_limit = add_input(m, prefix + "torque_limit", Unit::one, 1, 0, 1, "of the full-load peak");
         law.fuel_cut = add_switch(m, prefix + "fuel_cut", "1: no fuel");
         m.engines.push_back(law);
@@ -174,29 +190,38 @@ void build_laws(ModelData& m) {
     for (const TorqueSource& source : d.sources) {
         SourceLaw law;
         law.mass = s.mass(source.mass);
-        if (source.input) law.input = add_input(m, "source." + source.name + ".torque", Unit::newton_metre, 0, -1e9, 1e9, "test-bench torque");
+        if (source.input)
+            law.input = add_input(m, "source." + source.name + ".torque", Unit::newton_metre, 0, -1e9, 1e9,
+                                  "test-bench torque");
         add_breakpoints(m, source.waveform);
         if (!source.waveform.pieces.empty()) m.depends_on_time = true;
         m.sources.push_back(law);
     }
     for (const Road& road : d.roads) {
-        m.grade = add_input(m, "environment.grade", Unit::one, 0, -10, 10, "slope of the road, positive uphill");
+        m.grade =
+            add_input(m, "environment.grade", Unit::one, 0, -10, 10, "slope of the road, positive uphill");
         m.road_mass.push_back(s.mass(road.body));
     }
     for (const Plough& plough : d.ploughs) {
         m.draft = add_input(m, "environment.draft", Unit::one, 0, 0, 10, "plough 0 out … 1 in the ground");
-        m.ploughs.push_back({s.mass(plough.body), s.pair(plough.body + ".resistance"), -1, plough_curve(plough)});
+        m.ploughs.push_back(
+            {s.mass(plough.body), s.pair(plough.body + ".resistance"), -1, plough_curve(plough)});
     }
-    if (d.oil) m.oil_temperature = add_input(m, "environment.oil_temperature", Unit::celsius, d.oil->initial_temperature, -40, 200, "transmission oil");
+    if (d.oil)
+        m.oil_temperature = add_input(m, "environment.oil_temperature", Unit::celsius,
+                                      d.oil->initial_temperature, -40, 200, "transmission oil");
     for (const SpeedSensor& sensor : d.sensors) {
         const std::string prefix = "sensor." + sensor.name + ".";
         SensorLaw law;
         law.mass = s.mass(sensor.mass);
-        law.bias = add_input(m, prefix + "bias", Unit::radian_per_second, 0, -1e6, 1e6, "fault: added to the reading");
-        law.noise = add_input(m, prefix + "noise", Unit::radian_per_second, 0, 0, 1e6, "fault: standard deviation");
+        law.bias = add_input(m, prefix + "bias", Unit::radian_per_second, 0, -1e6, 1e6,
+                             "fault: added to the reading");
+        law.noise =
+            add_input(m, prefix + "noise", Unit::radian_per_second, 0, 0, 1e6, "fault: standard deviation");
         law.stuck = add_switch(m, prefix + "stuck", "fault: 1 holds the reading");
         law.dropout = add_switch(m, prefix + "dropout", "fault: 1 reads 0");
-        law.missing_teeth = add_input(m, prefix + "missing_teeth", Unit::one, 0, 0, 1000, "fault: teeth without an edge per turn");
+        law.missing_teeth = add_input(m, prefix + "missing_teeth", Unit::one, 0, 0, 1000,
+                                      "fault: teeth without an edge per turn");
         m.sensors.push_back(law);
     }
     std::sort(m.breakpoints.begin(), m.breakpoints.end());
@@ -219,14 +244,16 @@ void build_sizes(ModelData& m) {
     for (double inertia : s.inertia) m.root_inertia.push_back(std::sqrt(inertia));
     for (const FrictionPair& pair : s.pairs) {
         const double noteworthy = 1e-2 * pair.nominal_capacity;
-        if (pair.kind != PairKind::clutch || (m.noteworthy_torque > 0 && noteworthy > m.noteworthy_torque)) continue;
+        if (pair.kind != PairKind::clutch || (m.noteworthy_torque > 0 && noteworthy > m.noteworthy_torque))
+            continue;
         m.noteworthy_torque = noteworthy;
     }
     for (double inertia : s.inertia) m.energy_factor.push_back(0.5 * inertia);
     for (const Elastic& shaft : s.shafts)
         m.energy_factor.push_back(shaft.gap > 0 ? 0 : 0.5 * shaft.stiffness);
     for (int j = 0; j < m.masses; ++j) {
-        if (m.description.masses[static_cast<std::size_t>(j)].motion == Motion::translating) m.translating.push_back(j);
+        if (m.description.masses[static_cast<std::size_t>(j)].motion == Motion::translating)
+            m.translating.push_back(j);
     }
 
     const auto branchless = [](auto links) {
@@ -241,11 +268,13 @@ void build_sizes(ModelData& m) {
         const double slope = mesh.forward_efficiency - 1 / mesh.backward_efficiency;
         if (mesh.lossy()) m.lossy_meshes.push_back(static_cast<int>(m.lossy.size()));
         m.lossy.push_back(mesh.lossy());
-        m.loss_kink.push_back(slope < 0 ? (mesh.forward_bearing - mesh.backward_bearing) / slope : mesh.forward_bearing / 2);
+        m.loss_kink.push_back(slope < 0 ? (mesh.forward_bearing - mesh.backward_bearing) / slope
+                                        : mesh.forward_bearing / 2);
     }
     for (const Mesh& mesh : s.meshes) m.mesh_slip.push_back(branchless(mesh.column(mesh.ratio)));
     for (const Mesh& mesh : s.meshes) {
-        m.mesh_loss.push_back(branchless(std::array<Link, 2>{Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}}));
+        m.mesh_loss.push_back(
+            branchless(std::array<Link, 2>{Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}}));
     }
     for (const Elastic& shaft : s.shafts) m.shaft_rate.push_back(branchless(shaft.links));
     for (const Elastic& damper : s.dampers) m.damper_rate.push_back(branchless(damper.links));
@@ -254,7 +283,8 @@ void build_sizes(ModelData& m) {
     for (const Mesh& mesh : s.meshes) {
         const bool bearing = mesh.forward_bearing > 0 || mesh.backward_bearing > 0;
         m.bearing_force.push_back(bearing ? static_cast<int>(m.force_columns.size()) : -1);
-        if (bearing) m.force_columns.push_back({Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}});
+        if (bearing)
+            m.force_columns.push_back({Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}});
     }
     m.first_external = static_cast<int>(m.force_columns.size());
     m.external_force.assign(static_cast<std::size_t>(m.masses), -1);
@@ -349,14 +379,17 @@ void choose_engine(ModelData& m) {
     std::string reason;
     m.tree = build_topology(m, reason);
     if (!m.tree && method == Method::ark3) {
-        throw ModelError("model", m.description.name, "method", "= ark3 needs a machine without loops: " + reason);
+        throw ModelError("model", m.description.name, "method",
+                         "= ark3 needs a machine without loops: " + reason);
     }
 }
 
 // Constants of the loops over heated clutches and pick-ups, side by side.
 void build_device_numbers(ModelData& m) {
     constexpr double never = std::numeric_limits<double>::infinity();
-    const auto panels = [](std::size_t count) { return static_cast<std::size_t>(whole_panels(static_cast<int>(count))); };
+    const auto panels = [](std::size_t count) {
+        return static_cast<std::size_t>(whole_panels(static_cast<int>(count)));
+    };
     HeatNumbers& heat = m.heat;
     for (auto* numbers : {&heat.e11, &heat.e12, &heat.e21, &heat.e22, &heat.f1, &heat.f2})
         numbers->assign(panels(m.heated_pairs.size()), 0.);
@@ -420,7 +453,9 @@ void build_layout(ModelData& m) {
 void build_outputs(ModelData& m) {
     const Description& d = m.description;
     const Structure& s = m.structure;
-    const auto add = [&](const std::string& name, Unit unit, const char* text) { return add_output(m, name, unit, text); };
+    const auto add = [&](const std::string& name, Unit unit, const char* text) {
+        return add_output(m, name, unit, text);
+    };
     for (const Mass& mass : d.masses) {
         add("mass." + mass.name + ".speed",
             mass.motion == Motion::rotating ? Unit::radian_per_second : Unit::metre_per_second, "speed");
@@ -442,7 +477,8 @@ void build_outputs(ModelData& m) {
     of_clutches(".state", Unit::one, "0 locked, 1 slipping, 2 free", every);
     of_clutches(".heat_power", Unit::watt, "friction power", every);
     of_clutches(".heat", Unit::joule, "friction heat since start", every);
-    of_clutches(".pressure", Unit::pascal, "chamber pressure", [](const PairLaw& law) { return law.hydraulic; });
+    of_clutches(".pressure", Unit::pascal, "chamber pressure",
+                [](const PairLaw& law) { return law.hydraulic; });
     of_clutches(".temperature", Unit::celsius, "facing surface", [](const PairLaw& law) { return law.heat; });
     for (const Freewheel& f : d.freewheels) {
         const std::string prefix = "freewheel." + f.name + ".";
@@ -463,7 +499,8 @@ void build_outputs(ModelData& m) {
     for (const Gear& gear : d.gears)
         add("gear." + gear.name + ".direction", Unit::one,
             "x: +1 the first link drives, -1 it is driven, 0 at rest");
-    for (const Gear& gear : d.gears) add("gear." + gear.name + ".power", Unit::watt, "power into the first link");
+    for (const Gear& gear : d.gears)
+        add("gear." + gear.name + ".power", Unit::watt, "power into the first link");
     for (const Planetary& row : d.planetaries) {
         const std::string prefix = "row." + row.name + ".";
         add(prefix + "sun", Unit::newton_metre, "torque from the sun into the row");
@@ -477,7 +514,8 @@ void build_outputs(ModelData& m) {
     }
     for (const TorqueConverter& c : d.converters) {
         add("converter." + c.name + ".pump_torque", Unit::newton_metre, "from the pump into the converter");
-        add("converter." + c.name + ".turbine_torque", Unit::newton_metre, "from the converter to the turbine");
+        add("converter." + c.name + ".turbine_torque", Unit::newton_metre,
+            "from the converter to the turbine");
     }
     for (const Engine& e : d.engines) {
         add("engine." + e.name + ".torque", Unit::newton_metre, "net torque on the crankshaft");
@@ -489,8 +527,10 @@ void build_outputs(ModelData& m) {
         add(prefix + "acceleration", Unit::metre_per_second2, "acceleration");
         add(prefix + "distance", Unit::metre, "way since start");
     }
-    for (const Plough& p : d.ploughs) add("plough." + p.name + ".draft", Unit::newton, "force that resists the body");
-    for (const SpeedSensor& sensor : d.sensors) add("sensor." + sensor.name + ".speed", Unit::radian_per_second, "reading");
+    for (const Plough& p : d.ploughs)
+        add("plough." + p.name + ".draft", Unit::newton, "force that resists the body");
+    for (const SpeedSensor& sensor : d.sensors)
+        add("sensor." + sensor.name + ".speed", Unit::radian_per_second, "reading");
     if (d.oil) {
         add("oil.temperature", Unit::celsius, "oil temperature");
         add("oil.viscosity", Unit::one, "dynamic viscosity in Pa s");
@@ -523,7 +563,8 @@ Model Model::build(const Description& description, const BuildOptions& options) 
     m.description = description;
     m.options = options;
     if (!(options.step_size > 0) || !std::isfinite(options.step_size)) {
-        throw ModelError("model", description.name, "step_size", "= " + std::to_string(options.step_size) + "; must be > 0");
+        throw ModelError("model", description.name, "step_size",
+                         "= " + std::to_string(options.step_size) + "; must be > 0");
     }
     m.kernel = detail::choose_kernel(options.kernel);
     m.structure = build_structure(m.description);
@@ -541,14 +582,30 @@ Model Model::build(const Description& description, const BuildOptions& options) 
     return Model(std::move(data));
 }
 
-double Model::step_size() const noexcept { return data_->options.step_size; }
-std::string_view Model::kernel() const noexcept { return data_->kernel.name; }
-std::string_view Model::engine() const noexcept { return data_->tree ? "ark3" : "etd3"; }
-const Description& Model::description() const noexcept { return data_->description; }
-const std::vector<Signal>& Model::inputs() const noexcept { return data_->inputs; }
-const std::vector<Signal>& Model::outputs() const noexcept { return data_->outputs; }
-const std::vector<std::string>& Model::device_names() const noexcept { return data_->device_names; }
-std::size_t Model::state_size() const noexcept { return static_cast<std::size_t>(data_->layout.size) * sizeof(double); }
+double Model::step_size() const noexcept {
+    return data_->options.step_size;
+}
+std::string_view Model::kernel() const noexcept {
+    return data_->kernel.name;
+}
+std::string_view Model::engine() const noexcept {
+    return data_->tree ? "ark3" : "etd3";
+}
+const Description& Model::description() const noexcept {
+    return data_->description;
+}
+const std::vector<Signal>& Model::inputs() const noexcept {
+    return data_->inputs;
+}
+const std::vector<Signal>& Model::outputs() const noexcept {
+    return data_->outputs;
+}
+const std::vector<std::string>& Model::device_names() const noexcept {
+    return data_->device_names;
+}
+std::size_t Model::state_size() const noexcept {
+    return static_cast<std::size_t>(data_->layout.size) * sizeof(double);
+}
 
 int Model::input(std::string_view name) const noexcept {
     const auto at = data_->input_index.find(name);

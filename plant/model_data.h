@@ -23,22 +23,33 @@
 namespace shiftrig::plant::detail {
 
 // What presses a friction pair together, and where that comes from.
-enum class LoadSource { constant, waveform, input, release, apply, hydraulic, rolling, resistance, engine, rated };
+enum class LoadSource {
+    constant,
+    waveform,
+    input,
+    release,
+    apply,
+    hydraulic,
+    rolling,
+    resistance,
+    engine,
+    rated
+};
 
 struct PairLaw {
     LoadSource source{};
     FrictionLaw friction;
-    double drag = 0;           // of the open clutch, per viscosity and slip [m³]
-    double full_load = 0;      // load at full engagement, for a pair stuck closed [Nm]
+    double drag = 0;             // of the open clutch, per viscosity and slip [m³]
+    double full_load = 0;        // load at full engagement, for a pair stuck closed [Nm]
     double sliding_at_rest = 0;  // friction factor at no slip [1]
     const Waveform* profile = nullptr;
     const ActuationHydraulic* hydraulic = nullptr;
     LagOperator lag;
-    int actuator = -1;         // offset in the State block
-    int delay_slots = 0;       // of a hydraulic actuator
+    int actuator = -1;                                          // offset in the State block
+    int delay_slots = 0;                                        // of a hydraulic actuator
     int command = -1, stuck = -1, valve_stuck = -1, leak = -1;  // inputs
-    int temperature = -1;      // of the surface, offset in the State block
-    int freewheel = -1;        // index into ModelData::freewheels
+    int temperature = -1;                                       // of the surface, offset in the State block
+    int freewheel = -1;                                         // index into ModelData::freewheels
     const FacingHeat* heat = nullptr;
 };
 
@@ -93,49 +104,51 @@ struct ModelData {
     // z = [ω; φ]; f = [pairs; bearing friction of meshes; external torques; ∓kδ of flanks].
     int masses = 0, twists = 0, pairs = 0, meshes = 0;
     int states = 0, states_padded = 0;
-    int forces = 0;                       // m
-    int first_external = 0;               // where bearing friction ends in f
-    int first_flank_force = 0;            // where external torques end in f
-    int plain_shafts = 0;                 // without play; those with it follow
-    int columns = 0;                      // states + m, at most what an operator multiplies
+    int forces = 0;             // m
+    int first_external = 0;     // where bearing friction ends in f
+    int first_flank_force = 0;  // where external torques end in f
+    int plain_shafts = 0;       // without play; those with it follow
+    int columns = 0;            // states + m, at most what an operator multiplies
     // What a view shows: slips of forces, motions of meshes; from `law_rows` on what losses of meshes, shafts and dampers
     // act on; from `power_rows` on z.
     // Both are whole panels, so that the first part alone (force laws), or the first two (powers), are products too.
     int law_rows = 0, power_rows = 0, seen = 0;
-    int torques = 0;                      // unknowns: pairs, meshes, losses of stuck meshes
-    int auxiliary = 0;                    // tyre slips, engine torque and boost
-    int contact_bytes = 0;                // pairs, meshes, flanks
-    int first_flank = 0;                  // contact byte: pairs + meshes
+    int torques = 0;                                 // unknowns: pairs, meshes, losses of stuck meshes
+    int auxiliary = 0;                               // tyre slips, engine torque and boost
+    int contact_bytes = 0;                           // pairs, meshes, flanks
+    int first_flank = 0;                             // contact byte: pairs + meshes
     int maximum_events = 0, maximum_parts = 0;       // of a step, as described or as flanks need
     std::vector<std::array<Link, 2>> force_columns;  // how f_k acts *out of* the masses (SDM sign)
     // Slips and twist rates for the step: the housing is there mass 0 with factor 0, which needs no branch.
     std::vector<std::array<Link, 2>> pair_slip, mesh_motion, mesh_loss, shaft_rate, damper_rate, force_on;
     std::vector<std::array<Link, 3>> mesh_slip;
-    std::vector<unsigned char> lossy;     // per mesh
+    std::vector<unsigned char> lossy;  // per mesh
     std::vector<int> lossy_meshes;
-    std::vector<double> loss_kink;        // torque at which the loss lines of both directions cross, moving forward [Nm]
-    bool depends_on_time = false;         // waveforms: forces are no function of state and inputs alone
-    std::vector<int> bearing_force;       // per mesh, −1: none
-    std::vector<int> external_force;      // per mass, −1: none
-    double drag_speed_limit = 0;          // of open clutches [rad/s]
-    double noteworthy_torque = 0;         // 1 % of the weakest clutch: less is idling [Nm]
-    std::vector<double> root_inertia;     // √J
+    std::vector<double>
+        loss_kink;  // torque at which the loss lines of both directions cross, moving forward [Nm]
+    bool depends_on_time = false;      // waveforms: forces are no function of state and inputs alone
+    std::vector<int> bearing_force;    // per mesh, −1: none
+    std::vector<int> external_force;   // per mass, −1: none
+    double drag_speed_limit = 0;       // of open clutches [rad/s]
+    double noteworthy_torque = 0;      // 1 % of the weakest clutch: less is idling [Nm]
+    std::vector<double> root_inertia;  // √J
     // For the loops over all devices, so many zeros longer that whole registers can be read:
-    std::vector<double> energy_factor;    // by state: J/2, then k/2
+    std::vector<double> energy_factor;                   // by state: J/2, then k/2
     std::vector<double> static_factor, sliding_at_rest;  // per pair: of its load [1]
-    std::vector<double> swing_damping;    // of shafts, then dampers
-    std::vector<double> power_lost, power_given;  // per force: 1 where its power is lost in a pair or bearing, comes from outside
-    bool loses_in_fields = false;         // there are tyres or converters
-    int swings = 0;                       // shafts and dampers
+    std::vector<double> swing_damping;                   // of shafts, then dampers
+    std::vector<double> power_lost,
+        power_given;  // per force: 1 where its power is lost in a pair or bearing, comes from outside
+    bool loses_in_fields = false;                     // there are tyres or converters
+    int swings = 0;                                   // shafts and dampers
     std::vector<int> translating, translating_force;  // masses
-    std::unique_ptr<TreeTopology> tree;   // of the engine for long chains; none: dense modes
+    std::unique_ptr<TreeTopology> tree;               // of the engine for long chains; none: dense modes
 
     std::vector<PairLaw> pair_laws;
     std::vector<FreewheelLaw> freewheels;
     std::vector<BacklashLaw> backlashes;
     std::vector<int> hydraulic_pairs, pedal_pairs, waveform_pairs;  // by what actuates them
     std::vector<int> heated_pairs;
-    int actuated_pairs = 0;               // pairs before those that are loaded by nature (rolling, resistance, engine)
+    int actuated_pairs = 0;  // pairs before those that are loaded by nature (rolling, resistance, engine)
     std::vector<TyreLaw> tyres;
     std::vector<ConverterLaw> converters;
     std::vector<EngineLaw> engines;
@@ -145,7 +158,7 @@ struct ModelData {
     std::vector<SensorLaw> sensors;
     HeatNumbers heat;
     PickupNumbers pickups;
-    std::vector<double> breakpoints;      // of all waveforms, sorted [s]
+    std::vector<double> breakpoints;  // of all waveforms, sorted [s]
 
     std::vector<Signal> inputs, outputs;
     std::map<std::string, int, std::less<>> input_index, output_index;

@@ -24,9 +24,9 @@ namespace shiftrig::plant::detail {
 
 // Bits of Mode::bound: why a pair does not slip, a mesh does not move.
 enum Bound : unsigned char {
-    by_active_set = 1,   // others of the active set hold it at zero: it cannot change its state by itself
-    by_stuck_meshes = 2, // meshes only: held by a stuck mesh
-    shares_load = 4,     // locked pair whose torque is not unique: it is in a loop of closed devices
+    by_active_set = 1,    // others of the active set hold it at zero: it cannot change its state by itself
+    by_stuck_meshes = 2,  // meshes only: held by a stuck mesh
+    shares_load = 4,      // locked pair whose torque is not unique: it is in a loop of closed devices
 };
 
 struct Mode {
@@ -37,29 +37,31 @@ struct Mode {
     int* rows = nullptr;             // active torque row → unknown (pair, mesh, loss of mesh)
     std::array<Link, 3>* row_links = nullptr;  // their kinematic columns
     int row_count = 0;
-    int first_mesh = 0;              // row of the first mesh: all meshes stand there, in their order
-    int base_rank = 0;               // of locked pairs and meshes
-    int rank = 0;                    // with stuck meshes
-    bool rests = false;              // some lossy mesh is at rest, stuck or bound
-    bool redundant = false;          // more unknowns than independent rows: the split is not unique
-    double* basis = nullptr;         // Q, masses × rank
-    int order = 0;                   // number of coordinates
-    int* coordinates = nullptr;      // q_i = z[coordinates[i]]
-    double* loss_share = nullptr;    // per mesh: power lost = share·M_1·turning, 1 − û/u; 0 where at rest
-    double* family_mobility = nullptr;    // per mesh: 1/√(reduced inertia) of its motion; negative: not yet asked for
-    signed char* relations = nullptr;     // meshes × contact bytes: which devices at rest turn with it
-    double* view = nullptr;          // E and all slips   panels, seen × order
-    double* mobility = nullptr;      // B                 panels, masses × masses
-    double* rates = nullptr;         // [L S̃]             panels, states × (order + forces)
-    double* torques = nullptr;       // [R_q R_f]         panels, (rows + translating) × (order + forces); the latter
-                                     //                   are accelerations
-    double* force_torques = nullptr; // R_f alone              panels, rows + translating × forces
-    double* balance = nullptr;       // C_Iᵀ J⁻¹ (M̃ − Ĉ M_R), in torques  panels, rows × (order + forces + rows)
-    StepOperators step;              // for the model's step size
-    int ledger_parts = 1;            // into how many parts the ledger divides a step: stiff shafts swing within it
-    StepOperators ledger;            // for one of them
+    int first_mesh = 0;            // row of the first mesh: all meshes stand there, in their order
+    int base_rank = 0;             // of locked pairs and meshes
+    int rank = 0;                  // with stuck meshes
+    bool rests = false;            // some lossy mesh is at rest, stuck or bound
+    bool redundant = false;        // more unknowns than independent rows: the split is not unique
+    double* basis = nullptr;       // Q, masses × rank
+    int order = 0;                 // number of coordinates
+    int* coordinates = nullptr;    // q_i = z[coordinates[i]]
+    double* loss_share = nullptr;  // per mesh: power lost = share·M_1·turning, 1 − û/u; 0 where at rest
+    double* family_mobility =
+        nullptr;  // per mesh: 1/√(reduced inertia) of its motion; negative: not yet asked for
+    signed char* relations = nullptr;  // meshes × contact bytes: which devices at rest turn with it
+    double* view = nullptr;            // E and all slips   panels, seen × order
+    double* mobility = nullptr;        // B                 panels, masses × masses
+    double* rates = nullptr;           // [L S̃]             panels, states × (order + forces)
+    double* torques =
+        nullptr;  // [R_q R_f]         panels, (rows + translating) × (order + forces); the latter
+                  //                   are accelerations
+    double* force_torques = nullptr;  // R_f alone              panels, rows + translating × forces
+    double* balance = nullptr;  // C_Iᵀ J⁻¹ (M̃ − Ĉ M_R), in torques  panels, rows × (order + forces + rows)
+    StepOperators step;    // for the model's step size
+    int ledger_parts = 1;  // into how many parts the ledger divides a step: stiff shafts swing within it
+    StepOperators ledger;  // for one of them
     double *step_memory = nullptr, *ledger_memory = nullptr;
-    TreeMode* tree = nullptr;        // instead of all matrices, on the engine for long chains
+    TreeMode* tree = nullptr;  // instead of all matrices, on the engine for long chains
 };
 
 // Does the shaft act in the mode, or are its flanks open?
@@ -69,7 +71,8 @@ inline bool is_shaft_closed(const ModelData& m, const Mode& mode, int shaft) noe
 
 // Room that a mode and its operators take, in doubles and ints.
 struct ModeSizes {
-    int basis = 0, view = 0, mobility = 0, rates = 0, torques = 0, force_torques = 0, balance = 0, operators = 0;
+    int basis = 0, view = 0, mobility = 0, rates = 0, torques = 0, force_torques = 0, balance = 0,
+        operators = 0;
     int key = 0;  // bytes, a multiple of 8
     explicit ModeSizes(const ModelData& model);
     int doubles() const noexcept {
@@ -103,10 +106,10 @@ StepOperators build_step_operators(const ModelData& model, const Mode& mode, dou
 
 // What the inputs say of a pair, as long as they stay the same.
 struct PairCommand {
-    double target = 0;       // where its actuator goes: pressure [Pa], current [A] or share [1]
-    double scale = 1;        // leak: share of the chamber pressure that is left
-    bool fixed = false;      // stuck open or closed: its load is rest_loads' whatever the actuator does
-    bool valve_held = false; // the valve sticks
+    double target = 0;        // where its actuator goes: pressure [Pa], current [A] or share [1]
+    double scale = 1;         // leak: share of the chamber pressure that is left
+    bool fixed = false;       // stuck open or closed: its load is rest_loads' whatever the actuator does
+    bool valve_held = false;  // the valve sticks
 };
 
 // The cache: a table of bounded size, least recently used goes.
@@ -124,15 +127,15 @@ struct OperatorsData {
     std::uint64_t clock = 0;
     Mode* recent = nullptr;                     // the last one found,
     std::vector<unsigned char> recent_contact;  // for these contact states
-    std::vector<unsigned char> wanted;  // key being looked up
-    std::vector<std::uint64_t> hashes;  // of the modes' keys
+    std::vector<unsigned char> wanted;          // key being looked up
+    std::vector<std::uint64_t> hashes;          // of the modes' keys
     // Inputs as they act and what follows from them alone; kept as long as the inputs are the same bits.
     std::vector<double> raw_input, input;
     std::vector<PairCommand> commands;
-    std::vector<double> rest_loads;    // per pair: its load where its actuator has arrived at the command [Nm]
+    std::vector<double> rest_loads;  // per pair: its load where its actuator has arrived at the command [Nm]
     std::vector<SensorFaults> sensor_faults;
     bool teeth_missing = false, sensors_disturbed = false;  // some of them
-    std::vector<double> source_inputs;  // [Nm]
+    std::vector<double> source_inputs;                      // [Nm]
     std::vector<TyreSoil> soils;
     std::vector<EngineSetting> engine_settings;
     std::vector<double> grade_forces;  // per road [N]
@@ -146,7 +149,7 @@ struct OperatorsData {
     int begin_sample = 0;
     bool carried = false;
     std::vector<double> carried_engines;  // of the State block
-    double carried_energy = 0;           // stored in it [J]
+    double carried_energy = 0;            // stored in it [J]
 
     // Hydraulic operators by oil temperature, a pure function of it and h.
     double oil_temperature = 0;
@@ -165,6 +168,7 @@ Mode& find_mode(const ModelData& model, OperatorsData& operators, const unsigned
                 ScratchData& scratch) SHIFTRIG_REALTIME;
 
 // The hydraulic operators at this oil temperature.
-void at_oil_temperature(const ModelData& model, OperatorsData& operators, double temperature) SHIFTRIG_REALTIME;
+void at_oil_temperature(const ModelData& model, OperatorsData& operators,
+                        double temperature) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

@@ -75,16 +75,13 @@ void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME 
     const double *const mesh_torque = torque + m.pairs, *const direction = table.direction;
     next = copy_few(mesh_torque, gears, next);
     const unsigned char* const lossy = m.lossy.data();
-    put_each(gears, [&](int k) {
-        return lossy[k] ? direction[k] : flow(w, k, mesh_torque[k], speeds);
-    });
+    put_each(gears, [&](int k) { return lossy[k] ? direction[k] : flow(w, k, mesh_torque[k], speeds); });
     const Mesh* const meshes = m.structure.meshes.data();
     put_each(gears, [&](int k) { return mesh_torque[k] * speeds[meshes[k].first]; });
     for (int k = gears; k < m.meshes; ++k) {
         const double u = meshes[k].force_ratio(static_cast<int>(direction[k])), sun = mesh_torque[k];
         const double lost = meshes[k].ratio * torque[m.pairs + m.meshes + k];
-        put(sun, -u * sun + lost, -(1 - u) * sun - lost,
-            lossy[k] ? direction[k] : flow(w, k, sun, speeds));
+        put(sun, -u * sun + lost, -(1 - u) * sun - lost, lossy[k] ? direction[k] : flow(w, k, sun, speeds));
     }
     for (std::size_t t = 0; t < m.tyres.size(); ++t) put(s.tyre_force[t], s.tyre_slip[t]);
     for (std::size_t c = 0; c < m.converters.size(); ++c) put(s.converter[2 * c], s.converter[2 * c + 1]);

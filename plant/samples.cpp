@@ -32,7 +32,8 @@ void place_sample(const ModelData& m, Sample& s, double* memory) {
     s.z = s.slip + m.power_rows;
     s.rate = take(static_cast<std::size_t>(whole_panels(m.states_padded)));
     s.f = take(static_cast<std::size_t>(m.states + m.forces)) + m.states;
-    s.active = take(static_cast<std::size_t>(whole_panels(m.torques + static_cast<int>(m.translating.size()))));
+    s.active =
+        take(static_cast<std::size_t>(whole_panels(m.torques + static_cast<int>(m.translating.size()))));
     s.auxiliary = take(auxiliary);
     s.auxiliary_rate = take(auxiliary);
     s.load = take(pairs);

@@ -23,14 +23,15 @@ struct Sample {
     Instant at;
     // What the mode's view shows of the coordinates q, in the order of View: a product fills all or the first of these.
     double* slip = nullptr;     // per force: slip of pairs, of bearings in meshes, −ω of external torques
-    double* motion = nullptr;    // per mesh: ω_first − ω_carrier; not on a tree
+    double* motion = nullptr;   // per mesh: ω_first − ω_carrier; not on a tree
     double* turning = nullptr;  // per mesh: what its loss torque acts on (ModelData::mesh_loss)
     double* swing = nullptr;    // twist rate of each shaft, slip of each damper
     double* z = nullptr;        // [ω; φ]
     // What operators multiply: q ends where f begins (`coordinates`), f is followed by the torques of the mode's
     // active rows. A product that gives q comes before f is filled, since its padding reaches into it.
-    double* f = nullptr;       // forces
-    double* active = nullptr;  // behind f: torques in the order of Mode::rows, then accelerations of translating masses
+    double* f = nullptr;  // forces
+    double* active =
+        nullptr;  // behind f: torques in the order of Mode::rows, then accelerations of translating masses
     double* auxiliary = nullptr;
     double* auxiliary_rate = nullptr;
     double* load = nullptr;              // per pair: what presses it together [Nm]
@@ -90,7 +91,7 @@ struct ScratchData {
            *vector_c = nullptr;  // padded masses, torques, forces, or three blocks
     std::vector<double> torque_copy;
     AlignedDoubles works;
-    double* work = nullptr;                 // per force in this step, what it takes out: of pairs, their heat [J]
+    double* work = nullptr;  // per force in this step, what it takes out: of pairs, their heat [J]
     double dissipated = 0, input_work = 0;  // in this step [J]
     double stored_before = 0, stored = 0;   // at its beginning, at its end [J]
     double viscosity = 0, oil_temperature = 0;

@@ -20,8 +20,9 @@ constexpr double at_rest = 1e-9;  // [rad/s]
 
 // The speeds nearest to `wanted` (in the sense of kinetic energy, so that momentum is conserved) for which
 // the named columns slip at zero and the pinned masses turn as told.
-Eigen::VectorXd compatible_speeds(const ModelData& m, const Eigen::VectorXd& wanted, const std::vector<int>& locked,
-                                  bool following, const std::vector<std::pair<int, double>>& pinned) {
+Eigen::VectorXd compatible_speeds(const ModelData& m, const Eigen::VectorXd& wanted,
+                                  const std::vector<int>& locked, bool following,
+                                  const std::vector<std::pair<int, double>>& pinned) {
     const Structure& s = m.structure;
     const Eigen::MatrixXd pairs = s.pair_columns(), meshes = s.mesh_columns(), shafts = s.shaft_columns();
     const auto n = static_cast<Eigen::Index>(m.masses);
@@ -59,7 +60,8 @@ Eigen::VectorXd compatible_speeds(const ModelData& m, const Eigen::VectorXd& wan
 }
 
 // Actuators at rest at the inputs, auxiliary states as in steady running, contact states by the slip speeds.
-void initialise(const ModelData& m, double* block, const std::vector<double>& inputs, const std::vector<int>& locked) {
+void initialise(const ModelData& m, double* block, const std::vector<double>& inputs,
+                const std::vector<int>& locked) {
     const Structure& s = m.structure;
     const double* speeds = block + m.layout.speeds;
     auto* contact = reinterpret_cast<unsigned char*>(block + m.layout.contact);
@@ -70,25 +72,29 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
         contact[k] = detail::free_running;  // settled by its capacity in the first step
         switch (law.source) {
             case detail::LoadSource::release:
-            case detail::LoadSource::apply: block[law.actuator] = input(law.command); break;
+            case detail::LoadSource::apply:
+                block[law.actuator] = input(law.command);
+                break;
             case detail::LoadSource::hydraulic: {
                 double command = input(law.command), play = 0;
                 if (law.hydraulic->solenoid) {
                     play = command;
                     command = interpolate(law.hydraulic->solenoid->pressure_over_current, command);
                 }
-                HydraulicState state = hydraulic_rest(
-                    *law.hydraulic, law.friction.return_pressure, command,
-                    std::span<double>(block + law.actuator + detail::hydraulic_slots,
-                                      static_cast<std::size_t>(law.delay_slots)));
+                HydraulicState state =
+                    hydraulic_rest(*law.hydraulic, law.friction.return_pressure, command,
+                                   std::span<double>(block + law.actuator + detail::hydraulic_slots,
+                                                     static_cast<std::size_t>(law.delay_slots)));
                 state.play = play;
                 detail::write_hydraulic(block + law.actuator, state);
                 break;
             }
-            default: break;
+            default:
+                break;
         }
         if (law.temperature >= 0)
-            block[law.temperature] = block[law.temperature + m.layout.bulk_temperature] = input(m.oil_temperature);
+            block[law.temperature] = block[law.temperature + m.layout.bulk_temperature] =
+                input(m.oil_temperature);
     }
     for (int k : locked) contact[k] = detail::locked;
     for (int k = 0; k < m.meshes; ++k) {
@@ -107,7 +113,8 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
     }
     double* auxiliary = block + m.layout.auxiliary;
     for (std::size_t t = 0; t < m.tyres.size(); ++t, ++auxiliary) {
-        const double rim = speeds[m.tyres[t].wheel] * m.description.tyres[t].radius, v = speeds[m.tyres[t].body];
+        const double rim = speeds[m.tyres[t].wheel] * m.description.tyres[t].radius,
+                     v = speeds[m.tyres[t].body];
         const double rolling = std::fmax(std::fabs(rim), std::fabs(v));
         *auxiliary = rolling > 0 ? (rim - v) / rolling : 0;
     }
@@ -119,8 +126,8 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
         block[m.layout.engines + 3 * static_cast<int>(e)] =
             static_cast<double>(static_cast<int>(running ? EngineMode::running : EngineMode::stalled));
         if (!running) continue;
-        const EngineInput in{input(m.throttle), input(law.speed_request_enable) > 0.5, input(law.speed_request),
-                             input(law.torque_limit), input(law.fuel_cut) > 0.5};
+        const EngineInput in{input(m.throttle), input(law.speed_request_enable) > 0.5,
+                             input(law.speed_request), input(law.torque_limit), input(law.fuel_cut) > 0.5};
         const double full = full_load(engine, speed);
         auxiliary[0] = torque_demand(engine, engine_setting(engine, law.peak, in), speed, full, 1);
         auxiliary[1] = full > 0 ? std::clamp(auxiliary[0] / full, 0., 1.) : 0;
@@ -130,12 +137,14 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
         const SpeedSensor& sensor = m.description.sensors[i];
         const double speed = speeds[m.sensors[i].mass];
         sensor_slots.since_edge[i] = SensorState{}.since_edge;
-        sensor_slots.reading[i] = sensor_slots.output[i] = sensor.ideal || sensor.directional ? speed : std::fabs(speed);
+        sensor_slots.reading[i] = sensor_slots.output[i] =
+            sensor.ideal || sensor.directional ? speed : std::fabs(speed);
     }
     double* energy = block + m.layout.energy;
     energy[0] = energy[1] = 0;
     std::vector<double> z(speeds, speeds + m.masses);
     z.insert(z.end(), block + m.layout.twists, block + m.layout.twists + m.twists);
+    z.resize(z.size() + detail::loop_slack);
     energy[2] = detail::stored_energy(m, z.data(), contact);
 }
 
@@ -164,17 +173,24 @@ State::State(const Model& model) {
     initialise(m, block.data(), Inputs(model).value, locked);
 }
 
-std::int64_t State::steps() const noexcept { return detail::read_integer(block.data()); }
-double State::time() const noexcept { return static_cast<double>(steps()) * block[3]; }
+std::int64_t State::steps() const noexcept {
+    return detail::read_integer(block.data());
+}
+double State::time() const noexcept {
+    return static_cast<double>(steps()) * block[3];
+}
 
 std::span<const double> State::speeds() const noexcept {
-    return {block.data() + detail::StateLayout::header, static_cast<std::size_t>(detail::read_integer(&block[1]))};
+    return {block.data() + detail::StateLayout::header,
+            static_cast<std::size_t>(detail::read_integer(&block[1]))};
 }
 std::span<const double> State::twists() const noexcept {
     return {speeds().data() + speeds().size(), static_cast<std::size_t>(detail::read_integer(&block[2]))};
 }
 
-std::span<const std::byte> State::bytes() const noexcept { return std::as_bytes(std::span<const double>(block)); }
+std::span<const std::byte> State::bytes() const noexcept {
+    return std::as_bytes(std::span<const double>(block));
+}
 
 bool State::restore(std::span<const std::byte> bytes) noexcept {
     if (bytes.size() != block.size() * sizeof(double)) return false;

@@ -36,7 +36,9 @@ inline std::int64_t read_integer(const double* slot) noexcept {
     std::memcpy(&value, slot, sizeof value);
     return value;
 }
-inline void write_integer(double* slot, std::int64_t value) noexcept { std::memcpy(slot, &value, sizeof value); }
+inline void write_integer(double* slot, std::int64_t value) noexcept {
+    std::memcpy(slot, &value, sizeof value);
+}
 
 // What all pick-ups remember, side by side.
 template <typename Number>
@@ -57,7 +59,8 @@ inline HydraulicState read_hydraulic(const double* at) noexcept {
     return {at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7]};
 }
 inline void write_hydraulic(double* at, const HydraulicState& s) noexcept {
-    const double values[hydraulic_slots] = {s.play, s.head, s.slewed, s.valve, s.valve_rate, s.piston, s.chamber, s.steady};
+    const double values[hydraulic_slots] = {s.play,       s.head,   s.slewed,  s.valve,
+                                            s.valve_rate, s.piston, s.chamber, s.steady};
     for (int i = 0; i < hydraulic_slots; ++i) at[i] = values[i];
 }
 

@@ -80,10 +80,12 @@ struct EngineSetting {
 };
 inline EngineSetting engine_setting(const Engine& p, double peak, const EngineInput& input) noexcept {
     const auto rate = [](double lag) { return lag > 0 ? 1 / lag : 0; };
-    return {no_load_speed(p, input), input.torque_limit * peak, input.fuel_cut, rate(p.actuator_lag), rate(p.turbo_lag)};
+    return {no_load_speed(p, input), input.torque_limit * peak, input.fuel_cut, rate(p.actuator_lag),
+            rate(p.turbo_lag)};
 }
 
-inline double torque_demand(const Engine& p, const EngineSetting& set, double speed, double full, double boost) noexcept {
+inline double torque_demand(const Engine& p, const EngineSetting& set, double speed, double full,
+                            double boost) noexcept {
     const double friction = engine_friction(p, speed);
     if (set.fuel_cut) return -friction;
     const double share =
@@ -103,8 +105,8 @@ struct EngineDrive {
     double torque = 0;  // [Nm]
     EngineState rate;   // [Nm/s], [1/s]
 };
-inline EngineDrive engine_drive(const Engine& p, const EngineSetting& set, const EngineState& state, EngineMode mode,
-                                double speed, double full) noexcept {
+inline EngineDrive engine_drive(const Engine& p, const EngineSetting& set, const EngineState& state,
+                                EngineMode mode, double speed, double full) noexcept {
     EngineDrive drive;
     if (mode != EngineMode::running) {
         if (mode == EngineMode::cranking) drive.torque = starter_torque(p);

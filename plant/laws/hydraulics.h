@@ -111,7 +111,8 @@ struct HydraulicState {
     double valve_rate = 0;  // [Pa/s]
     double piston = 0;      // x [m]
     double chamber = 0;     // p_c [Pa]
-    double steady = 0;  // steps for which the command has been the same, at most the slots of the delay line; one more: quiet
+    double steady =
+        0;  // steps for which the command has been the same, at most the slots of the delay line; one more: quiet
 };
 
 // Slots that the delay line needs for the longest dead time (coldest oil).
@@ -259,12 +260,13 @@ inline double limited_command(const ActuationHydraulic& p, double command) noexc
 // Nothing will change in a step with this command: the delay line holds nothing else, and valve and piston have
 // arrived. Advancing the state would leave all but `head` as it is. Once found, `steady` says so: it is then enough that
 // the command is still where the chamber is.
-inline bool is_quiet(const ActuationHydraulic& p, double& steady, const HydraulicState& state, std::size_t slots,
-                     double command) noexcept {
+inline bool is_quiet(const ActuationHydraulic& p, double& steady, const HydraulicState& state,
+                     std::size_t slots, double command) noexcept {
     const double target = limited_command(p, command), all = static_cast<double>(slots);
     if (state.chamber != target) return false;
     if (steady > all) return true;
-    if (state.slewed != target || state.valve != target || state.valve_rate != 0 || steady < all) return false;
+    if (state.slewed != target || state.valve != target || state.valve_rate != 0 || steady < all)
+        return false;
     steady = all + 1;
     return true;
 }

@@ -56,22 +56,6 @@ inline TyreMotion tyre_motion(const BrixiusTyre& p, const TyreSoil& soil, double
     return {rate, kappa + damping * rate};
 }
 
-inline double tyre_slip_rate(const BrixiusTyre& p, double kappa, double wheel_speed,
-                             double body_speed) noexcept {
-    const double rim = wheel_speed * p.radius;
-    const double rolling = std::max(std::fabs(rim), std::fabs(body_speed));
-    return (rim - body_speed - rolling * kappa) / p.relaxation_length;
-}
-
-// The slip s that the force sees, from κ and κ̇.
-inline double tyre_slip(const BrixiusTyre& p, double kappa, double kappa_rate, double wheel_speed,
-                        double body_speed) noexcept {
-    const double rolling = std::max(std::fabs(wheel_speed * p.radius), std::fabs(body_speed));
-    const double damping =
-        p.slip_damping_time * p.relaxation_length / (p.relaxation_length + p.slip_damping_time * rolling);
-    return kappa + damping * kappa_rate;
-}
-
 inline double tyre_force(const TyreSoil& soil, double slip) noexcept {
     const double size = soil.grip * (1 - exp(-7.5 * std::fabs(slip)));
     return slip < 0 ? -size : size;

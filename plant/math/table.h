@@ -44,7 +44,8 @@ class Curve {
         double narrowest = table[last].first - table[0].first;
         for (std::size_t i = 0; i < table.size(); ++i) {
             const double slope =
-                i == last ? 0 : (table[i + 1].second - table[i].second) / (table[i + 1].first - table[i].first);
+                i == last ? 0
+                          : (table[i + 1].second - table[i].second) / (table[i + 1].first - table[i].first);
             knots_.push_back({table[i].first, table[i].second, slope});
             if (i < last) narrowest = std::fmin(narrowest, table[i + 1].first - table[i].first);
         }
@@ -54,7 +55,8 @@ class Curve {
         most_ = buckets - 1;
         std::size_t passed = 0;
         for (double bucket = 0; bucket < buckets; ++bucket) {
-            while (passed < last && knots_[passed + 1].x <= table[0].first + bucket / buckets * range) ++passed;
+            while (passed < last && knots_[passed + 1].x <= table[0].first + bucket / buckets * range)
+                ++passed;
             first_.push_back(static_cast<unsigned short>(passed));
         }
         knots_.push_back({std::numeric_limits<double>::quiet_NaN(), 0, 0});  // nothing passes it

@@ -49,7 +49,9 @@ EngineState settle(const Engine& e, const EngineInput& input, double speed, doub
     EngineState state;
     const double dt = 1e-3;
     for (double t = 0; t < seconds; t += dt) {
-        const EngineState rate = engine_drive(e, engine_setting(e, peak, input), state, EngineMode::running, speed, full_load(e, speed)).rate;
+        const EngineState rate = engine_drive(e, engine_setting(e, peak, input), state, EngineMode::running,
+                                              speed, full_load(e, speed))
+                                     .rate;
         state.torque += dt * rate.torque;
         state.boost += dt * rate.boost;
     }
@@ -105,7 +107,9 @@ TEST(Engine, StallsHoldsAndStartsAgain) {
     double crank = 0;
     EngineMode mode = next_engine_mode(e, EngineMode::running, 399 * rpm, false, 1e-3, crank);
     EXPECT_EQ(mode, EngineMode::stalled);
-    EXPECT_EQ(engine_drive(e, engine_setting(e, peak, throttle(1)), {500, 1}, mode, 30, full_load(e, 30)).torque, 0);
+    EXPECT_EQ(
+        engine_drive(e, engine_setting(e, peak, throttle(1)), {500, 1}, mode, 30, full_load(e, 30)).torque,
+        0);
     EXPECT_NEAR(stalled_friction_capacity(e, mode, 0), 70, 1e-12);
     EXPECT_EQ(stalled_friction_capacity(e, EngineMode::running, 0), 0);
     mode = next_engine_mode(e, mode, 0, false, 1e-3, crank);
@@ -116,7 +120,10 @@ TEST(Engine, StallsHoldsAndStartsAgain) {
     double speed = 0;
     int steps = 0;
     while (mode == EngineMode::cranking && steps < 5000) {
-        speed += 1e-3 * engine_drive(e, engine_setting(e, peak, throttle(0)), {}, mode, speed, full_load(e, speed)).torque / 2.6;
+        speed += 1e-3 *
+                 engine_drive(e, engine_setting(e, peak, throttle(0)), {}, mode, speed, full_load(e, speed))
+                     .torque /
+                 2.6;
         mode = next_engine_mode(e, mode, speed, false, 1e-3, crank);
         ++steps;
     }

@@ -131,16 +131,17 @@ TEST(Tyre, GrossAndNetTractionAreBrixius) {
 
 TEST(Tyre, SlipRelaxesOverItsLengthToTheKinematicSlip) {
     const BrixiusTyre tyre = reference_tyre();
+    const TyreSoil soil = tyre_soil(tyre, tyre.mobility_number);
     const double wheel = 2.2 / tyre.radius, v = 2;
     double kappa = 0;
     const double steady = (2.2 - 2) / 2.2, dt = 1e-5;
-    for (int i = 0; i < 100000; ++i) kappa += dt * tyre_slip_rate(tyre, kappa, wheel, v);
+    for (int i = 0; i < 100000; ++i) kappa += dt * tyre_motion(tyre, soil, kappa, wheel, v).rate;
     EXPECT_NEAR(kappa, steady * (1 - std::exp(-2.2 / 0.6)), 1e-6);
-    EXPECT_NEAR(tyre_slip_rate(tyre, steady, wheel, v), 0, 1e-14);
+    EXPECT_NEAR(tyre_motion(tyre, soil, steady, wheel, v).rate, 0, 1e-14);
     // At standstill the damping is τ κ̇; at speed it never leads beyond the steady slip.
-    EXPECT_NEAR(tyre_slip(tyre, 0, 0.3, 0, 0), 0.05 * 0.3, 1e-15);
-    const double fast = 20, rim = 22 / tyre.radius;
-    EXPECT_LT(tyre_slip(tyre, 0, tyre_slip_rate(tyre, 0, rim, fast), rim, fast), 2. / 22);
+    const TyreMotion slow = tyre_motion(tyre, soil, 0, 1e-9, 0);
+    EXPECT_NEAR(slow.slip, 0.05 * slow.rate, 1e-9 * slow.slip);
+    EXPECT_LT(tyre_motion(tyre, soil, 0, 22 / tyre.radius, 20).slip, 2. / 22);
 }
 
 TEST(Plough, DraftIsD497InItsUnits) {
