@@ -17,8 +17,13 @@ namespace {
 
 struct Machine {
     Machine(const std::string& file, KernelKind kernel)
-        : model(Model::build(io::read_model(std::string(SHIFTRIG_CONFIG "/") + file).description, {1e-3, kernel})),
-          operators(model), state(model), scratch(model), inputs(model), outputs(model) {}
+        : model(Model::build(io::read_model(std::string(SHIFTRIG_CONFIG "/") + file).description,
+                             {1e-3, kernel})),
+          operators(model),
+          state(model),
+          scratch(model),
+          inputs(model),
+          outputs(model) {}
     void set(const std::string& name, double value) {
         const int index = model.input(name);
         if (index >= 0) inputs.value[static_cast<std::size_t>(index)] = value;
@@ -68,11 +73,11 @@ void tractor(benchmark::State& bench, const std::string& file, KernelKind kernel
     start(machine.model, machine.state, {{"Fc", "F2"}, {{"engine", 188.6}}}, machine.inputs);
     for (int n = 0; n < 3000; ++n) machine.step();
     if (shifting) {
-        machine.set("clutch.F2.pressure_command", 4e5);
-        machine.set("clutch.F3.pressure_command", 6e5);
-        for (int n = 0; n < 250; ++n) machine.step();
+        machine.set("clutch.F2.pressure_command", 3e5);
+        machine.set("clutch.F3.pressure_command", 5e5);
+        for (int n = 0; n < 300; ++n) machine.step();
     }
-    repeat(bench, machine, shifting ? 50 : 1000);
+    repeat(bench, machine, shifting ? 500 : 1000);
 }
 
 // The dearest step of a shift F2 to F3 under the plough, new modes included: of each step the fastest of 20 repeats, of
@@ -101,7 +106,8 @@ void worst_step(benchmark::State& bench, KernelKind kernel) {
                 if (n == 300) machine.set("clutch.F2.pressure_command", 0);
                 const auto begin = std::chrono::steady_clock::now();
                 machine.step();
-                const std::chrono::duration<double, std::nano> taken = std::chrono::steady_clock::now() - begin;
+                const std::chrono::duration<double, std::nano> taken =
+                    std::chrono::steady_clock::now() - begin;
                 auto& least = fastest[static_cast<std::size_t>(n)];
                 least = std::min(least, taken.count());
                 misses += machine.outputs.certificate.mode_misses;
@@ -121,7 +127,8 @@ void worst_step(benchmark::State& bench, KernelKind kernel) {
 void bare_products(benchmark::State& bench, KernelKind kind) {
     const detail::Kernel kernel = detail::choose_kernel(kind);
     const int n = 17, m = 13, r = 9, rows = detail::padded(n);
-    std::vector<double> panel(static_cast<std::size_t>(detail::panel_size(n, 3 * (n + m))), 0.01), v(64, 1.), y(64), z(64);
+    std::vector<double> panel(static_cast<std::size_t>(detail::panel_size(n, 3 * (n + m))), 0.01), v(64, 1.),
+        y(64), z(64);
     double fastest = 1e300;
     constexpr int batch = 100;
     while (bench.KeepRunningBatch(batch)) {

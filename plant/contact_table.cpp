@@ -11,7 +11,7 @@ namespace shiftrig::plant::detail {
 ContactTable::ContactTable(const ModelData& m)
     : pressed(static_cast<std::size_t>(m.pairs)),
       contact(static_cast<std::size_t>(m.contact_bytes)),
-      held(static_cast<std::size_t>(m.pairs)) {
+      laden(static_cast<std::size_t>(m.pairs), 1) {
     const int pairs = whole_panels(m.pairs), meshes = whole_panels(m.meshes);
     numbers = aligned_doubles(static_cast<std::size_t>(m.law_rows + 2 * pairs + 3 * meshes) + loop_slack);
     double* at = numbers.data()->value;
@@ -32,10 +32,15 @@ constexpr double state_codes[] = {0, 1, 1, 2};  // of PairState
 
 void doubt_table(Work& w) SHIFTRIG_REALTIME {
     ContactTable& table = w.operators.table;
-    const ScratchData& s = w.scratch;
-    bool same = !table.moving && s.moving_count == 0 && table.viscosity == w.operators.oil.viscosity;
-    const double *const was = table.held.data(), *const is = s.held.data();
-    for (int k = 0, count = w.model.actuated_pairs; k < count; ++k) same &= was[k] == is[k];
+    const double* const held = w.scratch.held.data();
+    const unsigned char* const moves = w.scratch.moves.data();
+    unsigned char* const laden = table.laden.data();
+    bool same = table.viscosity == w.operators.oil.viscosity;
+    for (int k = 0, count = w.model.actuated_pairs; k < count; ++k) {
+        const auto now = static_cast<unsigned char>(held[k] != 0 || moves[k] != 0);
+        same &= laden[k] == now;
+        laden[k] = now;
+    }
     table.known = table.known && same;
 }
 
@@ -43,11 +48,8 @@ void tabulate_contact(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     ContactTable& table = w.operators.table;
     if (table.known && std::memcmp(table.contact.data(), w.contact, table.contact.size()) == 0) return;
     const ModelData& m = w.model;
-    const ScratchData& s = w.scratch;
     table.known = true;
-    table.moving = s.moving_count != 0;
     table.viscosity = w.operators.oil.viscosity;
-    std::copy(s.held.begin(), s.held.end(), table.held.begin());
     std::copy(w.contact, w.contact + m.contact_bytes, table.contact.begin());
     table.pressed_count = 0;
     for (int k = 0; k < m.pairs; ++k) {
@@ -56,8 +58,8 @@ void tabulate_contact(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         table.sense[k] = slip_sign(state);
         table.drag[k] = state == free_running ? m.pair_laws[i].drag * table.viscosity : 0;
         table.state_code[k] = state_codes[state];
-        const bool pressed = s.held[i] != 0 || s.moves[i] || k >= m.actuated_pairs;
-        if (state != locked && pressed) table.pressed[static_cast<std::size_t>(table.pressed_count++)] = k;
+        if (state != locked && table.laden[i] != 0)
+            table.pressed[static_cast<std::size_t>(table.pressed_count++)] = k;
     }
     for (int k = 0; k < m.meshes; ++k) {
         const unsigned char state = w.contact[m.pairs + k];

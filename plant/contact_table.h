@@ -33,13 +33,14 @@ struct ContactTable {
     int pressed_count = 0;
 
     // What it was made from.
-    bool known = false, moving = false;
+    bool known = false;
     std::vector<unsigned char> contact;
-    std::vector<double> held;
+    std::vector<unsigned char>
+        laden;  // per pair: it is loaded at some instant of the step; always, where by nature
     double viscosity = 0;
 };
 
-// Once a step, when it is known what presses the pairs: forgets a table made for other loads or other oil.
+// Once a step, when it is known what presses the pairs: notes which are, and forgets a table made for others or for other oil.
 void doubt_table(Work& work) SHIFTRIG_REALTIME;
 // Brings the table of `work.operators` up to date; `mode` is that of the contact states.
 void tabulate_contact(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
