@@ -116,6 +116,7 @@ struct ModelData {
     std::vector<double> swing_damping;    // of shafts, then dampers
     std::vector<double> static_factor, sliding_at_rest;  // per pair: of its load [1]
     std::unique_ptr<TreeTopology> tree;   // of the engine for long chains; none: dense modes
+    std::string engine_reason;            // why so, in words
 
     std::vector<PairLaw> pair_laws;
     std::vector<FreewheelLaw> freewheels;

@@ -254,13 +254,18 @@ Description chain(int n) {
 
 TEST(Ark3, IsChosenForLongChainsAndRefusedForLoops) {
     EXPECT_EQ(Model::build(chain(10)).engine(), "etd3");
+    EXPECT_EQ(Model::build(chain(10)).engine_reason(), "18 speeds and twists");
     EXPECT_EQ(Model::build(chain(60)).engine(), "ark3");
+    EXPECT_EQ(Model::build(chain(60)).engine_reason(), "108 speeds and twists, a tree");
     Description d = chain(60);
     d.method = Method::etd3;
     EXPECT_EQ(Model::build(d).engine(), "etd3");
+    EXPECT_EQ(Model::build(d).engine_reason(), "as the model asks");
     d.method = Method::automatic;
     d.clutches.push_back(clutch("loop", "m3", "m40", 100));
     EXPECT_EQ(Model::build(d).engine(), "etd3") << "a loop needs the dense engine";
+    EXPECT_EQ(Model::build(d).engine_reason(),
+              "108 speeds and twists would take ark3, but \"sm39\" closes a loop");
     d.method = Method::ark3;
     try {
         Model::build(d);
