@@ -21,6 +21,7 @@ Gear lossy_gear(const std::string& name, const std::string& a, const std::string
     return gear;
 }
 
+// Every number is drawn in a statement of its own: the same machines with every compiler.
 struct Forest {
     explicit Forest(std::uint64_t seed) : random(seed) {}
     std::mt19937_64 random;
@@ -43,13 +44,15 @@ struct Forest {
                 d.shafts.push_back({name, first, second, real(100, 3000), real(0, 5), 0});
                 if (below(4) == 0) d.dampers.push_back({name + "d", second, first, real(0.1, 2)});
             } else if (kind < 0.7) {
-                const double f = real(0.3, 1.5);
-                d.clutches.push_back(clutch(name, first, second, real(20, 200), 1 + below(2) * 0.15,
-                                            ActuationDirect{sine(1, f, -1e300, 1e300, real(0, 1)), 0}));
+                const double f = real(0.3, 1.5), phase = real(0, 1);
+                const double static_ratio = 1 + below(2) * 0.15, capacity = real(20, 200);
+                d.clutches.push_back(clutch(name, first, second, capacity, static_ratio,
+                                            ActuationDirect{sine(1, f, -1e300, 1e300, phase), 0}));
             } else if (kind < 0.95) {
                 const double efficiency = losses ? real(0.6, 1) : 1;
-                d.gears.push_back(lossy_gear(name, first, second, (below(3) == 0 ? -1 : 1) * real(0.4, 2.5),
-                                             efficiency, losses && below(3) == 0 ? real(0.1, 2) : 0));
+                const double bearing = losses && below(3) == 0 ? real(0.1, 2) : 0;
+                const double sign = below(3) == 0 ? -1 : 1, ratio = sign * real(0.4, 2.5);
+                d.gears.push_back(lossy_gear(name, first, second, ratio, efficiency, bearing));
             } else {
                 d.dampers.push_back({name, first, second, real(0.5, 5)});
             }
@@ -57,13 +60,14 @@ struct Forest {
         for (int j = 0; j < n; ++j) {
             const std::string name = "m" + std::to_string(j);
             if (below(4) == 0) {
-                d.clutches.push_back(
-                    clutch("b" + name, name, "", real(20, 100), 1.1,
-                           ActuationDirect{sine(1, real(0.3, 1.5), -1e300, 1e300, real(0, 1)), 0}));
+                const double phase = real(0, 1), f = real(0.3, 1.5), capacity = real(20, 100);
+                d.clutches.push_back(clutch("b" + name, name, "", capacity, 1.1,
+                                            ActuationDirect{sine(1, f, -1e300, 1e300, phase), 0}));
             }
-            if (below(3) == 0)
-                d.sources.push_back(
-                    source(name, sine(real(20, 150), real(0.5, 4), -1e300, 1e300, real(0, 1))));
+            if (below(3) == 0) {
+                const double phase = real(0, 1), f = real(0.5, 4), amplitude = real(20, 150);
+                d.sources.push_back(source(name, sine(amplitude, f, -1e300, 1e300, phase)));
+            }
             if (below(6) == 0) d.dampers.push_back({"g" + name, name, "", real(0.01, 1)});
         }
         if (d.sources.empty()) d.sources.push_back(source("m0", sine(100, 2)));
@@ -96,7 +100,6 @@ TEST(Ark3, InternalTorquesOfEveryLockPatternAreThoseOfTheDenseEngine) {
         ASSERT_EQ(tree.model.engine(), "ark3");
         observe(dense.model, dense.operators, dense.state, dense.inputs, dense.outputs, dense.scratch);
         observe(tree.model, tree.operators, tree.state, tree.inputs, tree.outputs, tree.scratch);
-        tied += dense.outputs.certificate.flags & 1;
         double scale = 1;
         for (double value : dense.outputs.value) scale = std::max(scale, std::fabs(value));
         for (std::size_t i = 0; i < dense.outputs.value.size(); ++i) {
@@ -106,8 +109,11 @@ TEST(Ark3, InternalTorquesOfEveryLockPatternAreThoseOfTheDenseEngine) {
                 << name << ", seed " << seed;
         }
         ++compared;
+        tree.step();
+        tied += tree.outputs.certificate.flags & 1;
     }
     EXPECT_EQ(compared, 300);
+    EXPECT_GT(tied, 15) << "several brakes on one group are among them";
 }
 
 // Runs with every change of state: both engines at a step that resolves the shafts.
