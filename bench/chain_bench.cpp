@@ -9,7 +9,7 @@
 namespace shiftrig::plant {
 namespace {
 
-enum class Contact { locked, slipping, alternating };
+enum class Contact { locked, slipping, alternating, swinging };  // swinging: locked, the torque turns round
 
 Description chain(int n, Contact contact) {
     Description d;
@@ -39,7 +39,8 @@ Description chain(int n, Contact contact) {
         } else if (j > 0) {
             d.shafts.push_back({"s" + b, a, b, 2e4, 10, 0});
         }
-        mass.initial_speed = contact == Contact::locked ? 100 : 100 - 2 * clutches;
+        const bool together = contact == Contact::locked || contact == Contact::swinging;
+        mass.initial_speed = together ? 100 : 100 - 2 * clutches;
         d.masses.push_back(mass);
     }
     TorqueSource source;
@@ -59,8 +60,13 @@ void step_chain(benchmark::State& bench, Contact contact, Method method) {
     Inputs inputs(model);
     Outputs outputs(model);
     Scratch scratch(model);
-    inputs.value[static_cast<std::size_t>(model.input("source.drive.torque"))] = 50;
-    for (auto _ : bench) step(model, operators, state, inputs, outputs, scratch);
+    double& torque = inputs.value[static_cast<std::size_t>(model.input("source.drive.torque"))];
+    torque = 50;
+    unsigned steps = 0;
+    for (auto _ : bench) {
+        if (contact == Contact::swinging && ++steps % 16 == 0) torque = -torque;
+        step(model, operators, state, inputs, outputs, scratch);
+    }
     bench.SetLabel(std::string(model.engine()) + " " + std::string(model.kernel()));
     bench.counters["fall_backs"] = outputs.certificate.fall_backs;
 }
@@ -87,6 +93,7 @@ BENCHMARK_CAPTURE(step_chain, alternating, Contact::alternating, Method::automat
     ->Arg(50)
     ->Arg(200)
     ->Arg(1000);
+BENCHMARK_CAPTURE(step_chain, swinging, Contact::swinging, Method::automatic)->Arg(50)->Arg(200)->Arg(1000);
 BENCHMARK_CAPTURE(step_chain, locked_ark3, Contact::locked, Method::ark3)->Arg(2)->Arg(10)->Arg(20);
 BENCHMARK_CAPTURE(step_chain, locked_etd3, Contact::locked, Method::etd3)->Arg(20)->Arg(50);
 

@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "plant/contact.h"
+#include "plant/devices.h"
 #include "plant/modes.h"
 #include "plant/tree.h"
 
@@ -34,6 +35,49 @@ constexpr double explicit_table[stages][stages] = {
     {2 * gamma},
     {5535828885825. / 10492691773637, 788022342437. / 10882634858940},
     {6485989280629. / 16251701735622, -4246266847089. / 9704473918619, 10755448449292. / 10357097424841}};
+
+// b − b̂: by so much of each stage the embedded method of order 2 differs.
+constexpr double embedded_error[stages] = {
+    weights[0] - 2756255671327. / 12835298489170, weights[1] + 10771552573575. / 22201958757719,
+    weights[2] - 9247589265047. / 10645013368117, gamma - 2193209047091. / 5459859503100};
+
+// Of a step of z' = L z: row · A^power · 1 goes with (hL)^(power + 1).
+constexpr double coefficient(const double (&row)[stages], int power) {
+    double vector[stages] = {1, 1, 1, 1};
+    for (; power > 0; --power) {
+        double next[stages] = {};
+        for (int i = 0; i < stages; ++i) {
+            for (int j = 0; j < i; ++j) next[i] += implicit_table[i][j] * vector[j];
+            if (i > 0) next[i] += gamma * vector[i];
+        }
+        for (int i = 0; i < stages; ++i) vector[i] = next[i];
+    }
+    double sum = 0;
+    for (int i = 0; i < stages; ++i) sum += row[i] * vector[i];
+    return sum;
+}
+// The step has (hL)⁴ in excess by the first: so it damps a swing by the ratio 0.026 (hω)³ (numerics.md §6). The embedded
+// method differs by e = the second times (hL)³, and because the stages are of order 2, forces that change with time
+// enter both alike. So −(first/second) hL e takes the excess away.
+constexpr double excess = coefficient(weights, 3) - 1. / 24, embedded = coefficient(embedded_error, 2);
+
+// Where shafts swing, makes the linear part of the step one of order 4. hL/(1 − hγL)² in place of hL: the same to that
+// order, nothing where hω is large, and the step stays L-stable. With S = (1 − hγL)⁻¹, which a stage solves with,
+// it is (S² − S)/γ.
+void complete_swing(const TreeKernel& kernel, const TreeMode& t, const TreeWork& v, double h,
+                    const double* inverse, const double* lower) {
+    const EmbeddedSums sums{
+        {h * embedded_error[0], h * embedded_error[1], h * embedded_error[2], h * embedded_error[3]},
+        {v.begin.torque, v.stage_torque[0], v.stage_torque[1], v.stage_torque[2]},
+        {v.begin.force, v.stage_force[0], v.stage_force[1], v.stage_force[2]},
+        {v.begin.rate, v.stage_rate[0], v.stage_rate[1], v.stage_rate[2]}};
+    const Swing swing = kernel.swing_error(t.paths, sums, v.end.speed);
+    if (!(swing.error > ark3_swing_tolerance * h * std::max(swing.fastest, at_rest))) return;
+    const EmbeddedWork work{v.other.torque, v.right,       v.other.twist,
+                            v.other.speed,  v.other.force, v.other.rate};
+    constexpr double factor = -excess / embedded / gamma;
+    kernel.correct(t.paths, sums, h * gamma, inverse, lower, factor, work, v.end.speed, v.end.twist);
+}
 
 // The sample half way, for the search of the instant at which a locked pair gives way.
 void middle_sample(Work& w, const Mode& mode) {
@@ -144,6 +188,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     final.last_rate = v.stage_rate[stages - 2];
     final.star_twist = v.star_twist;
     kernel.finish(t.paths, final, v.end.speed, v.end.twist);
+    if (t.swings) complete_swing(kernel, t, v, h, inverse, lower);
     kernel.shaft_torques(t.paths, v.end.speed, v.end.twist, v.end.rate, v.end.passed, v.end.torque);
     for (int a = 0; a < m.auxiliary; ++a) {
         double change = 0;

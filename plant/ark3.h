@@ -9,6 +9,10 @@ namespace shiftrig::plant::detail {
 // The diagonal of its implicit table: the stage matrix is M + hγ D + (hγ)² K.
 inline constexpr double ark3_gamma = 1767732205903. / 4055673282236;
 
+// Swings are looked after where the embedded method differs by more than the first, as a share of the way that the
+// fastest mass turns in the step. It differs by 0.0062 (hω)² hΔω, so never where hω is below the second.
+inline constexpr double ark3_swing_tolerance = 1e-7, ark3_slow_swing = 2.8e-3;
+
 // As advance() of etd3.h: from the settled `begin` to `end_fraction` of the step in the mode; fills end, with forces
 // and internal torques, and half where a locked pair is overloaded at the end.
 void advance_tree(Work& work, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME;

@@ -375,13 +375,16 @@ void bound_step(ModelData& m) {
 void choose_engine(ModelData& m) {
     constexpr int dense_limit = 40;
     const Method method = m.description.method;
-    if (method == Method::etd3 || (method == Method::automatic && m.states <= dense_limit)) return;
-    std::string reason;
-    m.tree = build_topology(m, reason);
-    if (!m.tree && method == Method::ark3) {
-        throw ModelError("model", m.description.name, "method",
-                         "= ark3 needs a machine without loops: " + reason);
-    }
+    const std::string size = std::to_string(m.states) + " speeds and twists";
+    const bool small = m.states <= dense_limit;
+    m.engine_reason = method != Method::automatic ? "as the model asks" : small ? size : size + ", a tree";
+    if (method == Method::etd3 || (method == Method::automatic && small)) return;
+    std::string obstacle;
+    m.tree = build_topology(m, obstacle);
+    if (m.tree) return;
+    if (method == Method::ark3)
+        throw ModelError("model", m.description.name, "method", "= ark3 needs a machine without loops: " + obstacle);
+    m.engine_reason = size + " would take ark3, but " + obstacle;
 }
 
 // Constants of the loops over heated clutches and pick-ups, side by side.
@@ -590,6 +593,9 @@ std::string_view Model::kernel() const noexcept {
 }
 std::string_view Model::engine() const noexcept {
     return data_->tree ? "ark3" : "etd3";
+}
+std::string_view Model::engine_reason() const noexcept {
+    return data_->engine_reason;
 }
 const Description& Model::description() const noexcept {
     return data_->description;

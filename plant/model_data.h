@@ -124,8 +124,8 @@ struct ModelData {
     std::vector<std::array<Link, 3>> mesh_slip;
     std::vector<unsigned char> lossy;  // per mesh
     std::vector<int> lossy_meshes;
-    std::vector<double>
-        loss_kink;  // torque at which the loss lines of both directions cross, moving forward [Nm]
+    // Torque at which the loss lines of both directions cross, moving forward [Nm].
+    std::vector<double> loss_kink;
     bool depends_on_time = false;      // waveforms: forces are no function of state and inputs alone
     std::vector<int> bearing_force;    // per mesh, −1: none
     std::vector<int> external_force;   // per mass, −1: none
@@ -136,12 +136,13 @@ struct ModelData {
     std::vector<double> energy_factor;                   // by state: J/2, then k/2
     std::vector<double> static_factor, sliding_at_rest;  // per pair: of its load [1]
     std::vector<double> swing_damping;                   // of shafts, then dampers
-    std::vector<double> power_lost,
-        power_given;  // per force: 1 where its power is lost in a pair or bearing, comes from outside
+    // Per force: 1 where its power is lost in a pair or bearing, where it comes from outside.
+    std::vector<double> power_lost, power_given;
     bool loses_in_fields = false;                     // there are tyres or converters
     int swings = 0;                                   // shafts and dampers
     std::vector<int> translating, translating_force;  // masses
     std::unique_ptr<TreeTopology> tree;               // of the engine for long chains; none: dense modes
+    std::string engine_reason;                        // why so, in words
 
     std::vector<PairLaw> pair_laws;
     std::vector<FreewheelLaw> freewheels;

@@ -94,6 +94,7 @@ class Model {
     double step_size() const noexcept;
     std::string_view kernel() const noexcept;  // "portable", "avx2", "avx512"
     std::string_view engine() const noexcept;  // "etd3", "ark3"
+    std::string_view engine_reason() const noexcept;  // why this one, in words
     const Description& description() const noexcept;
 
     const std::vector<Signal>& inputs() const noexcept;

@@ -90,6 +90,7 @@ struct TreeMode {
     double* drag_loss = nullptr;        // power lost to the housing per q²
     double* inverse = nullptr;          // 1/D and L of the stage matrix for the model's step size
     double* lower = nullptr;
+    bool swings = false;  // may have swings that a step of the model's size damps noticeably
     // q = factor · z[slot], ψ = factor · z[slot]; without a shaft the factor is 0. Back: z = q or ψ over the factor.
     int* speed_slot = nullptr;
     int* twist_slot = nullptr;

@@ -60,11 +60,33 @@ struct MiddleSums {
 };
 using Middle = double (*)(const TreePaths&, const MiddleSums&, double* speed, double* rate) SHIFTRIG_REALTIME;
 
+// e = Σ weight_j (N_j + Q_j; δ_j) of momenta and twists: by what the embedded method differs.
+struct EmbeddedSums {
+    double weight[4];
+    const double *torque[4], *force[4], *rate[4];
+};
+
+// The largest e of a twist [rad], and the largest speed [rad/s].
+struct Swing {
+    double error = 0, fastest = 0;
+};
+using SwingError = Swing (*)(const TreePaths&, const EmbeddedSums&, const double* speed) SHIFTRIG_REALTIME;
+
+// Adds factor (S² − S) e to speeds and twists: S = (1 − hγL)⁻¹ of the linear part L is what a stage solves with.
+struct EmbeddedWork {
+    double *momentum, *passed, *twist, *first, *second, *rate;
+};
+using Correct = void (*)(const TreePaths&, const EmbeddedSums&, double weight, const double* inverse,
+                         const double* lower, double factor, const EmbeddedWork&, double* speed,
+                         double* twist) SHIFTRIG_REALTIME;
+
 struct TreeKernel {
     ShaftTorques shaft_torques = nullptr;
     Stage stage = nullptr;
     FinishStages finish = nullptr;
     Middle middle = nullptr;
+    SwingError swing_error = nullptr;
+    Correct correct = nullptr;
 };
 
 TreeKernel choose_tree_kernel(KernelKind kind);

@@ -182,6 +182,22 @@ inline void substitute(const TreePaths& t, const double* __restrict lower,
     }
 }
 
+// q and δ of (M + hγ D + (hγ)² K) q = p* − hγ K ψ*, with `passed` = hγ K ψ* link by link.
+inline void solve_stage(const TreePaths& t, const double* __restrict star_momentum, double* passed,
+                        const double* inverse, const double* lower, double* speed, double* rate) noexcept {
+    passed[t.groups] = 0;
+    const double* __restrict link = passed;
+    double* __restrict right = speed;
+    const int groups = t.groups;
+    for (int g = 0; g < groups; ++g) right[g] = star_momentum[g] + (link[g + 1] - link[g]);
+    move_heads(t, link, right);
+    eliminate(t, lower, right);
+    const double* __restrict reciprocal = inverse;
+    for (int g = 0; g < groups; ++g) right[g] *= reciprocal[g];
+    substitute(t, lower, right);
+    differences(t, right, rate);
+}
+
 void stage(const TreePaths& t, const StageSums& s, const double* momentum, const double* twist, double weight,
            const double* inverse, const double* lower, double* work, double* star_twist, double* speed,
            double* rate, double* torque) SHIFTRIG_REALTIME {
@@ -189,23 +205,13 @@ void stage(const TreePaths& t, const StageSums& s, const double* momentum, const
     if (s.count == 1) stage_start<1>(t, s, momentum, twist, weight, star_momentum, star_twist, work);
     if (s.count == 2) stage_start<2>(t, s, momentum, twist, weight, star_momentum, star_twist, work);
     if (s.count == 3) stage_start<3>(t, s, momentum, twist, weight, star_momentum, star_twist, work);
-    work[t.groups] = 0;
-    const double* __restrict passed = work;
-    const double* __restrict star = star_momentum;
-    double* const right = speed;
-    const int groups = t.groups;
-    for (int g = 0; g < groups; ++g) right[g] = star[g] + (passed[g + 1] - passed[g]);
-    move_heads(t, passed, right);
-    eliminate(t, lower, speed);
-    const double* __restrict reciprocal = inverse;
-    for (int g = 0; g < groups; ++g) right[g] *= reciprocal[g];
-    substitute(t, lower, speed);
-    differences(t, speed, rate);
+    solve_stage(t, star_momentum, work, inverse, lower, speed, rate);
 
     const double inverse_weight = 1 / weight;
-    const double* __restrict mass = t.mass;
+    const double* __restrict mass = t.mass, * __restrict q = speed;
     double* const shaft = torque;
-    for (int g = 0; g < groups; ++g) shaft[g] = (mass[g] * right[g] - shaft[g]) * inverse_weight;
+    const int groups = t.groups;
+    for (int g = 0; g < groups; ++g) shaft[g] = (mass[g] * q[g] - shaft[g]) * inverse_weight;
 }
 
 void finish(const TreePaths& t, const FinalSums& s, double* speed, double* twist) SHIFTRIG_REALTIME {
@@ -251,7 +257,68 @@ double middle(const TreePaths& t, const MiddleSums& s, double* speed, double* ra
     return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
 }
 
-constexpr TreeKernel kernel{shaft_torques, stage, finish, middle};
+Swing swing_error(const TreePaths& t, const EmbeddedSums& s, const double* speed) SHIFTRIG_REALTIME {
+    constexpr int lanes = 8;
+    double errors[lanes] = {}, speeds[lanes] = {};
+    const double *d0 = s.rate[0], *d1 = s.rate[1], *d2 = s.rate[2], *d3 = s.rate[3];
+    const double w0 = s.weight[0], w1 = s.weight[1], w2 = s.weight[2], w3 = s.weight[3];
+    const auto look = [&](int g, double& error, double& fastest) {
+        const double sum =
+            SHIFTRIG_FMA(w3, d3[g], SHIFTRIG_FMA(w2, d2[g], SHIFTRIG_FMA(w1, d1[g], w0 * d0[g])));
+        const double wrong = __builtin_fabs(sum), q = __builtin_fabs(speed[g]);
+        error = wrong > error ? wrong : error;
+        fastest = q > fastest ? q : fastest;
+    };
+    int g = 0;
+    for (; g + lanes <= t.groups; g += lanes) {
+        for (int i = 0; i < lanes; ++i) look(g + i, errors[i], speeds[i]);
+    }
+    for (int i = 0; g < t.groups; ++g, ++i) look(g, errors[i], speeds[i]);
+    Swing swing;
+    for (int i = 0; i < lanes; ++i) {
+        swing.error = errors[i] > swing.error ? errors[i] : swing.error;
+        swing.fastest = speeds[i] > swing.fastest ? speeds[i] : swing.fastest;
+    }
+    return swing;
+}
+
+void correct(const TreePaths& t, const EmbeddedSums& s, double weight, const double* inverse,
+             const double* lower, double factor, const EmbeddedWork& work, double* speed,
+             double* twist) SHIFTRIG_REALTIME {
+    const double *n0 = s.torque[0], *n1 = s.torque[1], *n2 = s.torque[2], *n3 = s.torque[3];
+    const double *f0 = s.force[0], *f1 = s.force[1], *f2 = s.force[2], *f3 = s.force[3];
+    const double *d0 = s.rate[0], *d1 = s.rate[1], *d2 = s.rate[2], *d3 = s.rate[3];
+    const double w0 = s.weight[0], w1 = s.weight[1], w2 = s.weight[2], w3 = s.weight[3];
+    const double *mass = t.mass, *stiffness = t.stiffness;
+    double* __restrict star = work.momentum;
+    double* __restrict passed = work.passed;
+    double* __restrict psi = work.twist;
+    const int groups = t.groups;
+    for (int g = 0; g < groups; ++g) {
+        star[g] = SHIFTRIG_FMA(
+            w3, n3[g] + f3[g],
+            SHIFTRIG_FMA(w2, n2[g] + f2[g], SHIFTRIG_FMA(w1, n1[g] + f1[g], w0 * (n0[g] + f0[g]))));
+        psi[g] = SHIFTRIG_FMA(w3, d3[g], SHIFTRIG_FMA(w2, d2[g], SHIFTRIG_FMA(w1, d1[g], w0 * d0[g])));
+        passed[g] = weight * stiffness[g] * psi[g];
+    }
+    solve_stage(t, star, passed, inverse, lower, work.first, work.rate);
+    const double *first = work.first, *rate = work.rate;
+    for (int g = 0; g < groups; ++g) {
+        star[g] = mass[g] * first[g];
+        passed[g] = weight * stiffness[g] * SHIFTRIG_FMA(weight, rate[g], psi[g]);
+    }
+    solve_stage(t, star, passed, inverse, lower, work.second, work.rate);
+    const double* second = work.second;
+    double* __restrict q = speed;
+    double* __restrict end = twist;
+    const double of_rate = factor * weight;
+    for (int g = 0; g < groups; ++g) {
+        q[g] = SHIFTRIG_FMA(factor, second[g] - first[g], q[g]);
+        end[g] = SHIFTRIG_FMA(of_rate, rate[g], end[g]);
+    }
+}
+
+constexpr TreeKernel kernel{shaft_torques, stage, finish, middle, swing_error, correct};
 
 }  // namespace
 }  // namespace shiftrig::plant::detail

@@ -287,6 +287,26 @@ void find_forces(const ModelData& m, const Mode& mode, TreeMode& t) {
     }
 }
 
+// Can anything in the mode swing or fade fast enough to matter? Nothing is faster than the bounds of Gershgorin's
+// circles of M⁻¹ K and M⁻¹ D.
+void find_swing(const ModelData& m, TreeMode& t) {
+    double swing = 0, fade = 0;                         // ω², 1/s
+    double *stiffness = t.inverse, *damping = t.lower;  // Σ of the links at each group; not yet in use
+    std::fill(stiffness, stiffness + t.paths.groups, 0.);
+    std::copy(t.drag, t.drag + t.paths.groups, damping);
+    for (int g = t.paths.groups - 1; g >= 0; --g) {
+        stiffness[g] += t.stiffness[g];
+        damping[g] += t.damping[g];
+        if (t.parent[g] >= 0) {
+            stiffness[t.parent[g]] += t.stiffness[g];
+            damping[t.parent[g]] += t.damping[g];
+        }
+        swing = std::max(swing, 2 * stiffness[g] * t.inverse_mass[g]);
+        fade = std::max(fade, 2 * damping[g] * t.inverse_mass[g]);
+    }
+    t.swings = m.options.step_size * (std::sqrt(swing) + fade) > ark3_slow_swing;
+}
+
 }  // namespace
 
 void build_tree_mode(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
@@ -303,6 +323,7 @@ void build_tree_mode(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     find_masses(m, mode, t);
     find_forces(m, mode, t);
     if (t.ground_count > 0) factor_network(m, t);
+    find_swing(m, t);
     factor_stage(t, ark3_gamma * m.options.step_size, t.inverse, t.lower);
 }
 

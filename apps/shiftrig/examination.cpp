@@ -177,7 +177,9 @@ Examination examine(const io::ModelFile& file) {
     try {
         Examination result;
         result.machine = file.description;
-        result.engine = io::build_model(file).engine();  // everything that can be wrong comes out here
+        const plant::Model model = io::build_model(file);  // everything that can be wrong comes out here
+        result.engine = model.engine();
+        result.engine_reason = model.engine_reason();
         const plant::Structure structure = plant::build_structure(file.description);
         result.masses = structure.mass_names;
         for (const auto& pair : structure.pairs) result.devices.push_back(pair.name);
@@ -230,6 +232,7 @@ nlohmann::ordered_json as_json(const Examination& examination) {
     modes["open"] = modes_as_json(examination, examination.open);
     return {{"name", examination.machine.name},
             {"engine", examination.engine},
+            {"engine_reason", examination.engine_reason},
             {"masses", masses},
             {"distribution_matrix",
              {{"masses", examination.masses}, {"devices", examination.devices}, {"values", matrix}}},
@@ -242,7 +245,8 @@ nlohmann::ordered_json as_json(const Examination& examination) {
 
 void print(std::ostream& out, const Examination& examination, bool with_shapes) {
     out << examination.machine.name << " (" << examination.machine.masses.size() << " masses, "
-        << examination.devices.size() << " devices, integrated by " << examination.engine << ")\n\n";
+        << examination.devices.size() << " devices, integrated by " << examination.engine << ": "
+        << examination.engine_reason << ")\n\n";
     print_masses(out, examination);
     print_distribution(out, examination);
     print_gears(out, examination);

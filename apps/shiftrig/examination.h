@@ -25,7 +25,7 @@ struct Examination {
         std::vector<std::string> loop;  // devices whose torque split is not unique; empty: no loop
     };
     plant::Description machine;
-    std::string engine;                        // how a step is integrated: etd3, ark3
+    std::string engine, engine_reason;         // how a step is integrated: etd3, ark3; why so
     std::vector<std::string> masses, devices;  // rows and columns of the distribution matrix
     Eigen::MatrixXd distribution;              // [Algin] SDM: one column per device
     std::vector<Gear> gears;

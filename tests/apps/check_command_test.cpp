@@ -216,6 +216,15 @@ TEST(CheckCommand, DrawsEveryMassAndDevice) {
     EXPECT_NE(graph.find("label=\"range\\nu 3.024\""), std::string::npos);
 }
 
+TEST(CheckCommand, SaysWhichEngineIntegratesTheMachineAndWhy) {
+    const auto answer = checked("tractor.yaml");
+    EXPECT_EQ(answer.at("engine"), "etd3");
+    EXPECT_EQ(answer.at("engine_reason"), "17 speeds and twists");
+    const Said said = check({config + "tractor.yaml"});
+    EXPECT_EQ(said.out.substr(0, said.out.find('\n')),
+              "reference tractor (14 masses, 20 devices, integrated by etd3: 17 speeds and twists)");
+}
+
 // ---- what is wrong ---------------------------------------------------------------------------------------
 
 TEST(CheckCommand, AWrongModelIsOneLineAndCodeTwo) {
@@ -228,6 +237,18 @@ TEST(CheckCommand, AWrongModelIsOneLineAndCodeTwo) {
     EXPECT_EQ(said.exit_code, 2);
     EXPECT_EQ(said.out, "");
     EXPECT_EQ(said.err, path.string() + ":8:12: mass \"engine\": inertia_kg_m2 = -2.6; must be > 0\n");
+}
+
+TEST(CheckCommand, AnEngineThatCannotTakeTheMachineSaysWhatIsInItsWay) {
+    const auto path = std::filesystem::temp_directory_path() / "shiftrig_row.yaml";
+    const std::string text = test::whole(config + "article_fig5.yaml");
+    std::ofstream(path) << "method: ark3\n" << text;
+    const Said said = check({path.string()});
+    std::filesystem::remove(path);
+    EXPECT_EQ(said.exit_code, 2);
+    EXPECT_EQ(
+        said.err,
+        path.string() + ":1:1: method = ark3 needs a machine without loops: row \"D\" joins three masses\n");
 }
 
 TEST(CheckCommand, WrongUsageIsCodeTwo) {
