@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <chrono>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/model_file.h"
 #include "plant/kernels.h"
+#include "plant/ledger.h"
 #include "plant/plant.h"
 
 namespace shiftrig::plant {
@@ -64,6 +66,21 @@ void two_mass(benchmark::State& bench, KernelKind kernel) {
     repeat(bench, machine, 1000);
 }
 
+// Third gear of [Algin] Table 2, 100 Nm through; shifting, its brake C3 slips under a tenth of what it can.
+void wt_gearbox(benchmark::State& bench, KernelKind kernel, bool shifting) {
+    Machine machine("wt_gearbox.yaml", kernel);
+    for (const char* closed : {"clutch.C1.engagement", "clutch.C3.engagement"}) machine.set(closed, 1);
+    machine.set("source.input.torque", 100);
+    machine.set("source.output.torque", -150);
+    start(machine.model, machine.state, {{"C1", "C3"}, {{"input", 150}}}, machine.inputs);
+    for (int n = 0; n < 200; ++n) machine.step();
+    if (shifting) {
+        machine.set("clutch.C3.engagement", 0.005);
+        for (int n = 0; n < 100; ++n) machine.step();
+    }
+    repeat(bench, machine, shifting ? 100 : 1000);
+}
+
 // Ploughing in F2; with `shifting`, F2 and F3 slip against each other all the time.
 void tractor(benchmark::State& bench, const std::string& file, KernelKind kernel, bool shifting) {
     Machine machine(file, kernel);
@@ -78,6 +95,38 @@ void tractor(benchmark::State& bench, const std::string& file, KernelKind kernel
         for (int n = 0; n < 300; ++n) machine.step();
     }
     repeat(bench, machine, shifting ? 500 : 1000);
+}
+
+// What the ledger has in a step of the tractor: the last step's account, booked over and over.
+void ledger(benchmark::State& bench, KernelKind kernel) {
+    Machine machine("tractor.yaml", kernel);
+    machine.set("driver.throttle", 0.73);
+    machine.set("environment.draft", 1);
+    machine.set("clutch.F2.pressure_command", 18e5);
+    start(machine.model, machine.state, {{"Fc", "F2"}, {{"engine", 188.6}}}, machine.inputs);
+    for (int n = 0; n < 1000; ++n) machine.step();
+    const detail::ModelData& m = machine.model.data();
+    detail::OperatorsData& operators = machine.operators.data();
+    detail::ScratchData& scratch = machine.scratch.data();
+    double* block = machine.state.block.data();
+    auto* contact = reinterpret_cast<unsigned char*>(block + m.layout.contact);
+    detail::Work work{m,   operators, block, block, machine.outputs, scratch, contact, machine.state.time(),
+                      1e-3};
+    std::swap(scratch.begin, scratch.end);  // the step left its end where the next one begins
+    const detail::Mode& mode = detail::find_mode(m, operators, contact, scratch);
+    double fastest = 1e300;
+    constexpr int batch = 1000;
+    while (bench.KeepRunningBatch(batch)) {
+        const auto begin = std::chrono::steady_clock::now();
+        for (int i = 0; i < batch; ++i) {
+            detail::book(work, mode);
+            benchmark::ClobberMemory();
+        }
+        const std::chrono::duration<double, std::nano> taken = std::chrono::steady_clock::now() - begin;
+        fastest = std::min(fastest, taken.count() / batch);
+    }
+    bench.counters["fastest_ns"] = fastest;
+    bench.SetLabel(std::string(machine.model.kernel()));
 }
 
 // The dearest step of a shift F2 to F3 under the plough, new modes included: of each step the fastest of 20 repeats, of
@@ -158,7 +207,10 @@ void add(KernelKind kernel, const std::string& name) {
     const auto in = [&name](const char* what) { return std::string(what) + "/" + name; };
     benchmark::RegisterBenchmark(in("bare_products").c_str(), bare_products, kernel);
     benchmark::RegisterBenchmark(in("two_mass").c_str(), two_mass, kernel);
+    benchmark::RegisterBenchmark(in("tractor_ledger").c_str(), ledger, kernel);
     benchmark::RegisterBenchmark(in("worst_step").c_str(), worst_step, kernel);
+    benchmark::RegisterBenchmark(in("wt_gearbox_locked").c_str(), wt_gearbox, kernel, false);
+    benchmark::RegisterBenchmark(in("wt_gearbox_shifting").c_str(), wt_gearbox, kernel, true);
     for (const char* file : {"article_tractor.yaml", "tractor.yaml"}) {
         const std::string machine = std::string(file).substr(0, std::string(file).find('.'));
         benchmark::RegisterBenchmark((machine + "_locked/" + name).c_str(), tractor, file, kernel, false);
