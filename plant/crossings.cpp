@@ -220,7 +220,9 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         if (!middle_known) complete_half(w, mode);
         middle_known = true;
         const double g0 = turning_margin(w, k, begin), gm = turning_margin(w, k, w.scratch.half);
-        if (g0 <= 0) continue;  // just turned: it is within rounding of the point where both losses agree
+        // From no torque at all: the other loss acts from the beginning.
+        if (g0 <= 0 && gm >= 0)
+            continue;  // just turned: within rounding of the point where both losses agree
         const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
         if (first.device < 0 || theta < first.theta) first = {k, theta, Change::turn};
     }
