@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plant/standstill.h"
 #include "plant/stuck_meshes.h"
 
 namespace shiftrig::plant::detail {
@@ -173,7 +174,9 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
             if (release_stuck_meshes(w, mode, s) || leave_to_pairs(w, mode, s)) continue;
             const Use worst = most_used(w, w.contact, s);
             if (is_overloaded(w, worst.pair, s)) {
-                if (!lean_on_losses(w, mode, worst.share, s)) open_pair(w, mode, worst.pair, s);
+                if (lean_on_losses(w, mode, worst.share, s)) continue;
+                if (!holds_in_loops(w, mode) || rearrange(w, worst.pair, s) == Rearrangement::none)
+                    open_pair(w, mode, worst.pair, s);
                 continue;
             }
         }
