@@ -76,6 +76,16 @@ bool freewheels_hold(const Work& w, const Sample& end) {
     return true;
 }
 
+// Has a locked pair at an end of the part so little left that it may have had nothing within?
+bool is_near_limit(const Work& w, int pair, const Sample& begin, const Sample& end) {
+    const FreewheelLaw* law = freewheel_of(w, pair);
+    if (!law) return std::fabs(end.torque[pair]) > 0.8 * end.holding[pair];
+    const double t0 = begin.torque[pair], t1 = end.torque[pair];
+    if (law->sense * t1 > 0.8 * law->rated) return true;
+    const double least = law->drag + std::min(law->sense * t0, law->sense * t1);
+    return least < 0.2 * std::max(std::fabs(t0), std::fabs(t1));
+}
+
 // What holds half way, and the internal torques there: a stage knows neither. Its coordinates (on a tree, everything but
 // the torques) are there.
 void complete_half(Work& w, const Mode& mode) {
@@ -138,8 +148,7 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         if (slips(state)) {
             const double sign = slip_sign(state);
             consider(begun(sign * begin.slip[k]), sign * half.slip[k], sign * end.slip[k]);
-        } else if (state == locked && std::fabs(end.torque[k]) > 0.8 * end.holding[k] &&
-                   !freewheel_of(w, k)) {
+        } else if (state == locked && is_near_limit(w, k, begin, end)) {
             if (!torques_known) complete_half(w, mode);
             torques_known = true;
             consider(margin(w, k, begin), margin(w, k, half), margin(w, k, end));

@@ -30,6 +30,7 @@ namespace {
 
 constexpr int most_joints = 16;
 constexpr double at_its_limit = 1e-6;  // a pair that gives way holds so much less: well above rounding
+constexpr double resting = 1e-12;      // share of the accelerations there could be: none
 
 // A pair or a mesh at rest.
 struct Joint {
@@ -130,11 +131,11 @@ bool list_joints(const Work& w, const Mode& mode, const Sample& s, Rest& rest) {
     return true;
 }
 
-// Torque limits of a pair: what it can hold, or, once it broke away in this instant, what it passes on sliding.
-void set_limits(const Work& w, const Sample& s, Joint& joint) {
+// Torque limits of a pair: what it passes on sliding, or, with `reserve`, what it can hold before it breaks away.
+void set_limits(const Work& w, const Sample& s, bool reserve, Joint& joint) {
     const int k = joint.device;
     const bool overcome = w.scratch.overcome[static_cast<std::size_t>(k)] != 0;
-    const double capacity = overcome ? s.sliding[k] : std::max(s.holding[k], s.sliding[k]);
+    const double capacity = overcome || !reserve ? s.sliding[k] : std::max(s.holding[k], s.sliding[k]);
     const FreewheelLaw* law = freewheel_of(w, k);
     joint.upper = law && law->sense < 0 ? law->drag : capacity;
     joint.lower = law && law->sense > 0 ? -law->drag : -capacity;
@@ -398,7 +399,6 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
     contact_forces(w, w.contact, s);
     if (!known) return Rearrangement::none;
 
-    // A pair at its limit that passes less on sliding breaks away: the others have to do with that.
     unsigned char* const overcome = w.scratch.overcome.data();
     unsigned char given_way[most_joints] = {};
     const auto forget = [&] {
@@ -408,32 +408,43 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
         return Rearrangement::none;
     };
     double fastest = 0;
-    for (bool solved = false; !solved;) {
+    const auto solve_with = [&](bool reserve) {
         for (int i = 0; i < rest.count; ++i) {
             Joint& joint = rest.joints[i];
-            if (joint.mesh < 0) set_limits(w, s, joint);
-            if (joint.device == gives_way) {
-                const double limit = s.torque[gives_way] * (1 - at_its_limit);
-                if (limit > 0) joint.upper = std::min(joint.upper, limit);
-                if (limit < 0) joint.lower = std::max(joint.lower, limit);
-            }
+            if (joint.mesh < 0) set_limits(w, s, reserve, joint);
+            if (joint.device != gives_way) continue;
+            const double limit = s.torque[gives_way] * (1 - at_its_limit);
+            if (limit > 0) joint.upper = std::min(joint.upper, limit);
+            if (limit < 0) joint.lower = std::max(joint.lower, limit);
         }
-        if (!solve_once(m, rest)) return forget();
-        solved = true;
+        if (!solve_once(m, rest)) return false;
         fastest = 0;
         for (int i = 0; i < rest.count; ++i) {
-            const Joint& joint = rest.joints[i];
             double going;
-            const int side = side_of(rest, i, going);
+            side_of(rest, i, going);
             fastest = std::max(fastest, going);
-            if (joint.mesh >= 0 || side == 0 || overcome[joint.device]) continue;
-            if (!(s.sliding[joint.device] < s.holding[joint.device])) continue;
-            overcome[joint.device] = given_way[i] = 1;
+        }
+        return true;
+    };
+    const auto has_reserve = [&](const Joint& joint) {
+        return joint.mesh < 0 && !overcome[joint.device] && s.sliding[joint.device] < s.holding[joint.device];
+    };
+    // What stands on what all pass on sliding needs no reserves. Otherwise a pair at its limit that passes less on sliding
+    // breaks away, and the others have to do with that.
+    bool solved = std::any_of(rest.joints, rest.joints + rest.count, has_reserve) && solve_with(false) &&
+                  fastest <= resting;
+    while (!solved) {
+        if (!solve_with(true)) return forget();
+        solved = true;
+        for (int i = 0; i < rest.count; ++i) {
+            double going;
+            if (!has_reserve(rest.joints[i]) || side_of(rest, i, going) == 0) continue;
+            overcome[rest.joints[i].device] = given_way[i] = 1;
             solved = false;
         }
     }
 
-    const bool goes = fastest > at_its_limit * at_its_limit;
+    const bool goes = fastest > resting;
     // As few changes as do: torques that are not unique stay nearly what they were.
     const auto take = [&](bool all) {
         std::copy(w.contact, w.contact + m.contact_bytes, trial);
@@ -442,7 +453,7 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
             double going;
             const int side = side_of(rest, i, going);
             if (joint.device == gives_way && side == 0) continue;
-            if (all || going > at_its_limit * at_its_limit || (joint.device == gives_way && !goes))
+            if (all || going > resting || (joint.device == gives_way && !goes))
                 trial[joint.device] = state_of(rest, i, side);
         }
     };
