@@ -49,13 +49,6 @@ bool engage_and_release(Work& w, Sample& s) {
     return changed;
 }
 
-// The sense in which a locked pair begins to slip: that of its torque. A freewheel that lets go does so at next to none.
-double opening_sense(const Work& w, int pair, double torque) {
-    const FreewheelLaw* law = freewheel_of(w, pair);
-    if (!law) return torque;
-    return is_next_to_overrun(*law, torque) ? -law->sense : law->sense;
-}
-
 // Closings are told with the torques that they lead to.
 void tell_closings(Work& w, const Sample& s) {
     const int count = std::min(w.outputs.event_count, Outputs::event_capacity);

@@ -30,7 +30,8 @@ namespace {
 
 constexpr int most_joints = 16;
 constexpr double at_its_limit = 1e-6;  // a pair that gives way holds so much less: well above rounding
-constexpr double resting = 1e-12;      // share of the accelerations there could be: none
+constexpr double most_give = 1e-5;
+constexpr double resting = 1e-12;  // share of the accelerations there could be: none
 
 // A pair or a mesh at rest.
 struct Joint {
@@ -42,6 +43,7 @@ struct Joint {
     double difference = 0;        // δ
     double kink = 0;              // κ
     double scale = 1;             // √W_ii: torques are counted in 1/scale, accelerations in scale
+    double give = 0;              // of W_ii, where loads are shared out
 };
 
 struct Rest {
@@ -131,11 +133,11 @@ bool list_joints(const Work& w, const Mode& mode, const Sample& s, Rest& rest) {
     return true;
 }
 
-// Torque limits of a pair: what it passes on sliding, or, with `reserve`, what it can hold before it breaks away.
-void set_limits(const Work& w, const Sample& s, bool reserve, Joint& joint) {
+// Torque limits of a pair: what it can hold, or, once it broke away in this instant, what it passes on sliding.
+void set_limits(const Work& w, const Sample& s, Joint& joint) {
     const int k = joint.device;
     const bool overcome = w.scratch.overcome[static_cast<std::size_t>(k)] != 0;
-    const double capacity = overcome || !reserve ? s.sliding[k] : std::max(s.holding[k], s.sliding[k]);
+    const double capacity = overcome ? s.sliding[k] : std::max(s.holding[k], s.sliding[k]);
     const FreewheelLaw* law = freewheel_of(w, k);
     joint.upper = law && law->sense < 0 ? law->drag : capacity;
     joint.lower = law && law->sense > 0 ? -law->drag : -capacity;
@@ -217,11 +219,27 @@ bool set_up(const Work& w, const Mode& mode, const Sample& s, Rest& rest) {
         if (!(mobility > 1e-12 * dot(motion, motion, n))) return false;
         rest.joints[i].scale = std::sqrt(mobility);
     }
+    // The weights of build_mode().
+    double heaviest = 0, most = 0;
+    for (const FrictionPair& pair : m.structure.pairs) heaviest = std::max(heaviest, pair.nominal_capacity);
+    for (int pass = 0; pass < 2; ++pass) {
+        for (int i = 0; i < count; ++i) {
+            Joint& joint = rest.joints[i];
+            const double weight =
+                joint.mesh < 0 ? m.structure.pairs[static_cast<std::size_t>(joint.device)].nominal_capacity
+                               : 1e-3 * (heaviest > 0 ? heaviest : 1);
+            const double give = 1 / (weight * joint.scale * joint.scale);
+            most = std::max(most, give);
+            joint.give = most_give * give / most;
+        }
+    }
     return true;
 }
 
 // One complementarity problem, with the limits as they stand; leaves the torques of its solution in y and `torque`.
-bool solve_once(const ModelData& m, Rest& rest) {
+// `shared_out`: every joint gives a little under its torque, the less the larger its nominal capacity. Of all splits of a load
+// that is not unique, that is the one which the mode with the same states has.
+bool solve_once(const ModelData& m, bool shared_out, Rest& rest) {
     const int count = rest.count, meshes = m.meshes, size = rest.size(), columns = lemke_columns(size);
     const auto row_of = [&](const double* matrix, int i) { return matrix + i * count; };
     // (I − H C) y = H M_0 + o + δ v − p, where M = M_0 + C y and H holds the slopes.
@@ -240,6 +258,10 @@ bool solve_once(const ModelData& m, Rest& rest) {
     for (int i = 0; i < count; ++i) {
         for (int j = 0; j < count; ++j) rest.response[i * count + j] = rest.inverse[j * count + i];
     }
+    const auto mobility = [&](int i, int j) {
+        const double w = rest.w[i * count + j];
+        return shared_out && i == j ? w * (1 + rest.joints[i].give) : w;
+    };
     const auto turns = [&](int mesh, int j) {
         double sum = 0;
         for (int l = 0; l < count; ++l)
@@ -279,12 +301,12 @@ bool solve_once(const ModelData& m, Rest& rest) {
             return row;
         };
         double acceleration = rest.b[i];
-        for (int j = 0; j < count; ++j) acceleration -= rest.w[i * count + j] * rest.y[j];
+        for (int j = 0; j < count; ++j) acceleration -= mobility(i, j) * rest.y[j];
         double* const slip = set_row(
             i,
             [&](int j) {
                 double gain = 0;
-                for (int l = 0; l < count; ++l) gain += rest.w[i * count + l] * rest.response[l * count + j];
+                for (int l = 0; l < count; ++l) gain += mobility(i, l) * rest.response[l * count + j];
                 return -gain;
             },
             acceleration, 1 / joint.scale);
@@ -401,64 +423,69 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
 
     unsigned char* const overcome = w.scratch.overcome.data();
     unsigned char given_way[most_joints] = {};
+    const double given = gives_way < 0 ? 0 : s.torque[gives_way];
     const auto forget = [&] {
         for (int i = 0; i < rest.count; ++i) {
             if (given_way[i]) overcome[rest.joints[i].device] = 0;
         }
         return Rearrangement::none;
     };
-    double fastest = 0;
-    const auto solve_with = [&](bool reserve) {
+    const auto solve_with = [&](bool shared_out) {
         for (int i = 0; i < rest.count; ++i) {
             Joint& joint = rest.joints[i];
-            if (joint.mesh < 0) set_limits(w, s, reserve, joint);
+            if (joint.mesh < 0) set_limits(w, s, joint);
             if (joint.device != gives_way) continue;
-            const double limit = s.torque[gives_way] * (1 - at_its_limit);
+            const double limit = given * (1 - at_its_limit);
             if (limit > 0) joint.upper = std::min(joint.upper, limit);
             if (limit < 0) joint.lower = std::max(joint.lower, limit);
         }
-        if (!solve_once(m, rest)) return false;
-        fastest = 0;
-        for (int i = 0; i < rest.count; ++i) {
-            double going;
-            side_of(rest, i, going);
-            fastest = std::max(fastest, going);
-        }
-        return true;
+        return solve_once(m, shared_out, rest);
     };
-    const auto has_reserve = [&](const Joint& joint) {
-        return joint.mesh < 0 && !overcome[joint.device] && s.sliding[joint.device] < s.holding[joint.device];
-    };
-    // What stands on what all pass on sliding needs no reserves. Otherwise a pair at its limit that passes less on sliding
-    // breaks away, and the others have to do with that.
-    bool solved = std::any_of(rest.joints, rest.joints + rest.count, has_reserve) && solve_with(false) &&
-                  fastest <= resting;
-    while (!solved) {
-        if (!solve_with(true)) return forget();
-        solved = true;
+    bool goes = false;
+    unsigned char vertex[most_joints], going[most_joints];  // states that follow; does it go?
+    for (bool found = false; !found;) {
+        if (!solve_with(false)) return forget();
+        goes = false;
         for (int i = 0; i < rest.count; ++i) {
-            double going;
-            if (!has_reserve(rest.joints[i]) || side_of(rest, i, going) == 0) continue;
-            overcome[rest.joints[i].device] = given_way[i] = 1;
-            solved = false;
+            double share;
+            const int side = side_of(rest, i, share);
+            vertex[i] = state_of(rest, i, side);
+            going[i] = share > resting;
+            goes = goes || going[i];
         }
+        // As few changes as do, so that torques that are not unique stay nearly what they were; else as the load is shared
+        // out; else whatever solves it.
+        const auto take = [&](const auto& state) {
+            std::copy(w.contact, w.contact + m.contact_bytes, trial);
+            for (int i = 0; i < rest.count; ++i) trial[rest.joints[i].device] = state(i);
+            return is_consistent(w, trial, s);
+        };
+        found = take([&](int i) {
+            const int device = rest.joints[i].device;
+            if (going[i]) return vertex[i];
+            if (goes || device != gives_way) return w.contact[device];
+            return slipping(opening_sense(w, device, given));
+        });
+        if (!found && solve_with(true)) {
+            found = take([&](int i) {
+                double share;
+                return going[i] ? vertex[i] : state_of(rest, i, side_of(rest, i, share));
+            });
+        }
+        if (found) break;
+        // A pair at its limit that passes less on sliding breaks away: the others have to do with that.
+        bool breaks = false;
+        for (int i = 0; i < rest.count; ++i) {
+            const int device = rest.joints[i].device;
+            if (rest.joints[i].mesh >= 0 || vertex[i] == locked || overcome[device]) continue;
+            if (!(s.sliding[device] < s.holding[device])) continue;
+            overcome[device] = given_way[i] = 1;
+            breaks = true;
+        }
+        if (breaks) continue;
+        found = take([&](int i) { return vertex[i]; });
+        if (!found) break;
     }
-
-    const bool goes = fastest > resting;
-    // As few changes as do: torques that are not unique stay nearly what they were.
-    const auto take = [&](bool all) {
-        std::copy(w.contact, w.contact + m.contact_bytes, trial);
-        for (int i = 0; i < rest.count; ++i) {
-            const Joint& joint = rest.joints[i];
-            double going;
-            const int side = side_of(rest, i, going);
-            if (joint.device == gives_way && side == 0) continue;
-            if (all || going > resting || (joint.device == gives_way && !goes))
-                trial[joint.device] = state_of(rest, i, side);
-        }
-    };
-    take(false);
-    if (!is_consistent(w, trial, s)) take(true);
     contact_forces(w, w.contact, s);
     internal_torques(w, mode, s);
     // Meshes of one motion that share their losses in another way are no change; when they go, release_drive() says.
