@@ -4,7 +4,6 @@
 
 #include "plant/dense.h"
 #include "plant/modes.h"
-#include "plant/standstill.h"
 
 namespace shiftrig::plant::detail {
 namespace {
@@ -133,7 +132,7 @@ int workspace_doubles(const ModelData& m) noexcept {
                      + 4 * (m.states_padded + m.torques) + m.states_padded * m.columns +
                      padded(m.torques) * m.columns + coordinates_workspace(m);
     const int exponential = 16 * square + 3 * m.states_padded * (m.columns + 5 * m.forces);
-    return std::max({mode, exponential, standstill_workspace(m)}) + 64;
+    return std::max(mode, exponential) + 64;
 }
 
 int workspace_integers(const ModelData& m) noexcept {

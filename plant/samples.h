@@ -23,7 +23,7 @@ struct Sample {
     Instant at;
     // What the mode's view shows of the coordinates q, in the order of View: a product fills all or the first of these.
     double* slip = nullptr;     // per force: slip of pairs, of bearings in meshes, −ω of external torques
-    double* motion = nullptr;    // per mesh: ω_first − ω_carrier; not on a tree
+    double* motion = nullptr;   // per mesh: ω_first − ω_carrier; not on a tree
     double* turning = nullptr;  // per mesh: what its loss torque acts on (ModelData::mesh_loss)
     double* swing = nullptr;    // twist rate of each shaft, slip of each damper
     double* z = nullptr;        // [ω; φ]
@@ -96,7 +96,8 @@ struct ScratchData {
     double dissipated = 0, input_work = 0;  // in this step [J]
     double stored_before = 0, stored = 0;   // at its beginning, at its end [J]
     double viscosity = 0, oil_temperature = 0;
-    std::vector<double> workspace;  // of the mode builder
+    std::vector<double> workspace;   // of the mode builder
+    std::vector<double> standstill;  // of rearrange(), which builds modes on its way
     std::vector<int> workspace_index;
     AlignedDoubles operator_memory, ledger_memory;  // operators of a partial step, of a part of one
     const Mode* begin_groups = nullptr;             // mode in which the tree's begin.groups hold for `begin`

@@ -409,10 +409,11 @@ bool holds_in_loops(const Work& w, const Mode& mode) SHIFTRIG_REALTIME {
 
 Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    Mode& mode = find_mode(m, w.operators, w.contact, w.scratch);
+    const Mode& mode = find_mode(m, w.operators, w.contact, w.scratch);
     Rest rest;
-    place(m, rest, w.scratch.workspace.data());
-    if (mode.tree || !list_joints(w, mode, s, rest) || rest.count == 0) return Rearrangement::none;
+    if (mode.tree) return Rearrangement::none;
+    place(m, rest, w.scratch.standstill.data());
+    if (!list_joints(w, mode, s, rest) || rest.count == 0) return Rearrangement::none;
     unsigned char* const trial = w.scratch.trial.data();
     std::copy(w.contact, w.contact + m.contact_bytes, trial);
     for (int i = 0; i < rest.count; ++i) trial[rest.joints[i].device] = 0;  // locked, stuck
@@ -487,7 +488,7 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
         if (!found) break;
     }
     contact_forces(w, w.contact, s);
-    internal_torques(w, mode, s);
+    internal_torques(w, find_mode(m, w.operators, w.contact, w.scratch), s);
     // Meshes of one motion that share their losses in another way are no change; when they go, release_drive() says.
     const int relevant = goes ? m.contact_bytes : m.pairs;
     if (std::equal(trial, trial + relevant, w.contact)) return forget();
