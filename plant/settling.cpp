@@ -168,8 +168,7 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
             const Use worst = most_used(w, w.contact, s);
             if (is_overloaded(w, worst.pair, s)) {
                 if (lean_on_losses(w, mode, worst.share, s)) continue;
-                if (!holds_in_loops(w, mode) || rearrange(w, worst.pair, s) == Rearrangement::none)
-                    open_pair(w, mode, worst.pair, s);
+                if (rearrange(w, worst.pair, s) == Rearrangement::none) open_pair(w, mode, worst.pair, s);
                 continue;
             }
         }

@@ -397,16 +397,6 @@ int standstill_workspace(const ModelData& m) noexcept {
     return place(m, rest, &none);
 }
 
-bool holds_in_loops(const Work& w, const Mode& mode) SHIFTRIG_REALTIME {
-    if (mode.tree) return false;
-    if (mode.redundant) return true;
-    const ModelData& m = w.model;
-    for (int k = 0; k < m.pairs; ++k) {
-        if (slips(w.contact[k]) && mode.bound[k]) return true;
-    }
-    return false;
-}
-
 Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const Mode& mode = find_mode(m, w.operators, w.contact, w.scratch);
@@ -442,6 +432,16 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
         }
         return solve_once(m, shared_out, rest);
     };
+    const auto has_reserve = [&](int device) {
+        return device < m.pairs && !overcome[device] && s.sliding[device] < s.holding[device];
+    };
+    const auto break_away = [&](int i) { overcome[rest.joints[i].device] = given_way[i] = 1; };
+    int giving = 0;
+    while (giving < rest.count && rest.joints[giving].device != gives_way) ++giving;
+    const bool breaks_away = giving < rest.count && has_reserve(gives_way);
+    // The one that is beyond its limit breaks away first, and passes less from then on; others may only take its load where
+    // mechanics does not say how they share it.
+    if (breaks_away && !(mode.bound[gives_way] & shares_load)) break_away(giving);
     bool goes = false;
     unsigned char vertex[most_joints], going[most_joints];  // states that follow; does it go?
     for (bool found = false; !found;) {
@@ -453,6 +453,10 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
             vertex[i] = state_of(rest, i, side);
             going[i] = share > resting;
             goes = goes || going[i];
+        }
+        if (goes && breaks_away && !overcome[gives_way]) {
+            break_away(giving);
+            continue;
         }
         // As few changes as do, so that torques that are not unique stay nearly what they were; else as the load is shared
         // out; else whatever solves it.
@@ -477,10 +481,8 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
         // A pair at its limit that passes less on sliding breaks away: the others have to do with that.
         bool breaks = false;
         for (int i = 0; i < rest.count; ++i) {
-            const int device = rest.joints[i].device;
-            if (rest.joints[i].mesh >= 0 || vertex[i] == locked || overcome[device]) continue;
-            if (!(s.sliding[device] < s.holding[device])) continue;
-            overcome[device] = given_way[i] = 1;
+            if (vertex[i] == locked || !has_reserve(rest.joints[i].device)) continue;
+            break_away(i);
             breaks = true;
         }
         if (breaks) continue;

@@ -19,9 +19,6 @@ enum class Rearrangement {
 };
 Rearrangement rearrange(Work& work, int gives_way, Sample& sample) SHIFTRIG_REALTIME;
 
-// Do closed loops hold, or devices beyond their limits by others' doing, so that rearrange() is worth asking?
-bool holds_in_loops(const Work& work, const Mode& mode) SHIFTRIG_REALTIME;
-
 // Doubles of working memory.
 int standstill_workspace(const ModelData& model) noexcept;
 

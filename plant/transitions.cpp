@@ -130,7 +130,7 @@ bool change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
     } else if (device < w.model.pairs && w.contact[device] == locked) {
         const Mode& mode = find_mode(w.model, w.operators, w.contact, w.scratch);
         if (lean_on_losses(w, mode, most_used(w, w.contact, s).share, s)) return false;
-        const Rearrangement found = holds_in_loops(w, mode) ? rearrange(w, device, s) : Rearrangement::none;
+        const Rearrangement found = rearrange(w, device, s);
         if (found == Rearrangement::none) open_pair(w, mode, device, s);
         return found != Rearrangement::stands;
     } else {
