@@ -48,7 +48,7 @@ bool solve_complementarity(double* tableau, int* basis, int size) SHIFTRIG_REALT
     }
     if (row < 0) return true;
     int entering = artificial;
-    const int most = 8 * size + 16;
+    const int most = 3 * size + 16;  // machines at rest need fewer than `size`
     for (int pivots = 0; pivots < most; ++pivots) {
         pivot(tableau, size, row, entering);
         const int leaving = basis[row];

@@ -444,7 +444,8 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
     if (breaks_away && !(mode.bound[gives_way] & shares_load)) break_away(giving);
     bool goes = false;
     unsigned char vertex[most_joints], going[most_joints];  // states that follow; does it go?
-    for (bool found = false; !found;) {
+    bool found = false;
+    while (!found) {
         if (!solve_with(false)) return forget();
         goes = false;
         for (int i = 0; i < rest.count; ++i) {
@@ -491,6 +492,7 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
     }
     contact_forces(w, w.contact, s);
     internal_torques(w, find_mode(m, w.operators, w.contact, w.scratch), s);
+    if (!found) return forget();
     // Meshes of one motion that share their losses in another way are no change; when they go, release_drive() says.
     const int relevant = goes ? m.contact_bytes : m.pairs;
     if (std::equal(trial, trial + relevant, w.contact)) return forget();
