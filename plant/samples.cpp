@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "plant/modes.h"
-#include "plant/standstill.h"
+#include "plant/rest_problem.h"
 
 namespace shiftrig::plant {
 namespace detail {
@@ -73,7 +73,7 @@ ScratchData::ScratchData(const ModelData& m) {
     heat.assign(static_cast<std::size_t>(m.pairs), 0.);
     workspace.assign(static_cast<std::size_t>(m.tree ? TreeWork::doubles(m) : workspace_doubles(m)), 0.);
     if (m.tree) return;
-    standstill.assign(static_cast<std::size_t>(standstill_workspace(m)), 0.);
+    standstill.assign(static_cast<std::size_t>(rest_workspace(m)), 0.);
     workspace_index.assign(static_cast<std::size_t>(workspace_integers(m)), 0);
     for (auto* memory : {&operator_memory, &ledger_memory}) {
         *memory = aligned_doubles(static_cast<std::size_t>(ModeSizes(m).operators));

@@ -19,7 +19,4 @@ enum class Rearrangement {
 };
 Rearrangement rearrange(Work& work, int gives_way, Sample& sample) SHIFTRIG_REALTIME;
 
-// Doubles of working memory.
-int standstill_workspace(const ModelData& model) noexcept;
-
 }  // namespace shiftrig::plant::detail
