@@ -76,14 +76,11 @@ bool freewheels_hold(const Work& w, const Sample& end) {
     return true;
 }
 
-// Has a locked pair at an end of the part so little left that it may have had nothing within?
-bool is_near_limit(const Work& w, int pair, const Sample& begin, const Sample& end) {
-    const FreewheelLaw* law = freewheel_of(w, pair);
-    if (!law) return std::fabs(end.torque[pair]) > 0.8 * end.holding[pair];
-    const double t0 = begin.torque[pair], t1 = end.torque[pair];
-    if (law->sense * t1 > 0.8 * law->rated) return true;
-    const double least = law->drag + std::min(law->sense * t0, law->sense * t1);
-    return least < 0.2 * std::max(std::fabs(t0), std::fabs(t1));
+// Has a locked freewheel at an end of the part so little left that it may have had nothing within?
+bool is_near_limit(const FreewheelLaw& law, const Sample& begin, const Sample& end) {
+    const double t0 = law.sense * begin.torque[law.pair], t1 = law.sense * end.torque[law.pair];
+    if (t1 > 0.8 * law.rated) return true;
+    return law.drag + std::min(t0, t1) < 0.2 * std::max(std::fabs(t0), std::fabs(t1));
 }
 
 // What holds half way, and the internal torques there: a stage knows neither. Its coordinates (on a tree, everything but
@@ -143,16 +140,23 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     // What has just been let go begins at zero: it may be driven back at first.
     const auto begun = [](double slip) { return std::fabs(slip) < at_rest ? 0 : slip; };
     bool torques_known = false;
+    const auto consider_torque = [&](int k) {
+        if (!torques_known) complete_half(w, mode);
+        torques_known = true;
+        consider(margin(w, k, begin), margin(w, k, half), margin(w, k, end));
+    };
     for (int k = 0; k < m.pairs; ++k) {
         const unsigned char state = w.contact[k];
         if (slips(state)) {
             const double sign = slip_sign(state);
             consider(begun(sign * begin.slip[k]), sign * half.slip[k], sign * end.slip[k]);
-        } else if (state == locked && is_near_limit(w, k, begin, end)) {
-            if (!torques_known) complete_half(w, mode);
-            torques_known = true;
-            consider(margin(w, k, begin), margin(w, k, half), margin(w, k, end));
+        } else if (state == locked && std::fabs(end.torque[k]) > 0.8 * end.holding[k] &&
+                   !freewheel_of(w, k)) {
+            consider_torque(k);
         }
+    }
+    for (const FreewheelLaw& law : m.freewheels) {
+        if (w.contact[law.pair] == locked && is_near_limit(law, begin, end)) consider_torque(law.pair);
     }
     for (const int k : m.lossy_meshes) {
         const unsigned char state = w.contact[m.pairs + k];
