@@ -158,6 +158,11 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     for (const FreewheelLaw& law : m.freewheels) {
         if (w.contact[law.pair] == locked && is_near_limit(law, begin, end)) consider_torque(law.pair);
     }
+    for (const BacklashLaw& law : m.backlashes) {
+        first = std::min(first, touch_between(w, law, begin, end));
+        if (flank_side(w.contact[law.device]) != 0)
+            consider(flank_margin(w, law, begin), flank_margin_half_way(w, law), flank_margin(w, law, end));
+    }
     for (const int k : m.lossy_meshes) {
         const unsigned char state = w.contact[m.pairs + k];
         if (state == stuck || mode.bound[m.pairs + k]) continue;
