@@ -93,6 +93,13 @@ bool freewheels_hold(const Work& w, const Sample& end) {
     return true;
 }
 
+// Has a locked freewheel at an end of the part so little left that it may have had nothing within?
+bool is_near_limit(const FreewheelLaw& law, const Sample& begin, const Sample& end) {
+    const double t0 = law.sense * begin.torque[law.pair], t1 = law.sense * end.torque[law.pair];
+    if (t1 > 0.8 * law.rated) return true;
+    return law.drag + std::min(t0, t1) < 0.2 * std::max(std::fabs(t0), std::fabs(t1));
+}
+
 // What holds half way, and the internal torques there: a stage knows neither. Its coordinates (on a tree, everything but
 // the torques) are there.
 void complete_half(Work& w, const Mode& mode) {
@@ -138,7 +145,9 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const Sample &begin = w.scratch.begin, &half = w.scratch.half, &end = w.scratch.end;
     double first = 1;
     if (mode.tree) return first;
-    if (!some_pair_strained(w, mode, strained, end) && !m.kernel.loops.may_dip(speed_check(w))) return first;
+    const bool by_speeds_alone =
+        m.freewheels.empty() && m.backlashes.empty() && !some_pair_strained(w, mode, strained, end);
+    if (by_speeds_alone && !m.kernel.loops.may_dip(speed_check(w))) return first;
     // The least of the parabola through three margins; that they are about to vanish is enough to look closer.
     const auto consider = [&](double g0, double gm, double g1) {
         const double slope = 4 * gm - 3 * g0 - g1, bend = 2 * (g0 - 2 * gm + g1);
@@ -151,6 +160,11 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     // What has just been let go begins at zero: it may be driven back at first.
     const auto begun = [](double slip) { return std::fabs(slip) < at_rest ? 0 : slip; };
     bool torques_known = false;
+    const auto consider_torque = [&](int k) {
+        if (!torques_known) complete_half(w, mode);
+        torques_known = true;
+        consider(margin(w, k, begin), margin(w, k, half), margin(w, k, end));
+    };
     for (int k = 0; k < m.pairs; ++k) {
         const unsigned char state = w.contact[k];
         if (slips(state)) {
@@ -158,10 +172,16 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
             consider(begun(sign * begin.slip[k]), sign * half.slip[k], sign * end.slip[k]);
         } else if (state == locked && std::fabs(end.torque[k]) > strained * end.holding[k] &&
                    !freewheel_of(w, k)) {
-            if (!torques_known) complete_half(w, mode);
-            torques_known = true;
-            consider(margin(w, k, begin), margin(w, k, half), margin(w, k, end));
+            consider_torque(k);
         }
+    }
+    for (const FreewheelLaw& law : m.freewheels) {
+        if (w.contact[law.pair] == locked && is_near_limit(law, begin, end)) consider_torque(law.pair);
+    }
+    for (const BacklashLaw& law : m.backlashes) {
+        first = std::min(first, touch_between(w, law, begin, end));
+        if (flank_side(w.contact[law.device]) != 0)
+            consider(flank_margin(w, law, begin), flank_margin_half_way(w, law), flank_margin(w, law, end));
     }
     for (const int k : m.lossy_meshes) {
         const unsigned char state = w.contact[m.pairs + k];
@@ -238,7 +258,9 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         if (!middle_known) complete_half(w, mode);
         middle_known = true;
         const double g0 = turning_margin(w, k, begin), gm = turning_margin(w, k, w.scratch.half);
-        if (g0 <= 0) continue;  // just turned: it is within rounding of the point where both losses agree
+        // From no torque at all: the other loss acts from the beginning.
+        if (g0 <= 0 && gm >= 0)
+            continue;  // just turned: within rounding of the point where both losses agree
         const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
         if (first.device < 0 || theta < first.theta) first = {k, theta, Change::turn};
     }

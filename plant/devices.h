@@ -67,4 +67,11 @@ inline const FreewheelLaw* freewheel_of(const Work& w, int pair) {
     return index < 0 ? nullptr : &w.model.freewheels[static_cast<std::size_t>(index)];
 }
 
+// The sense in which a locked pair begins to slip: that of its torque. A freewheel that lets go does so at next to none.
+inline double opening_sense(const Work& w, int pair, double torque) {
+    const FreewheelLaw* law = freewheel_of(w, pair);
+    if (!law) return torque;
+    return is_next_to_overrun(*law, torque) ? -law->sense : law->sense;
+}
+
 }  // namespace shiftrig::plant::detail

@@ -1,6 +1,7 @@
 #include "plant/flanks.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "plant/transitions.h"
 
@@ -35,6 +36,26 @@ double flank_margin_half_way(const Work& w, const BacklashLaw& law) SHIFTRIG_REA
 
 bool is_flank_violated(const Work& w, const BacklashLaw& law, const Sample& s) SHIFTRIG_REALTIME {
     return is_flank_violated(law, flank_margin(w, law, s));
+}
+
+double touch_between(const Work& w, const BacklashLaw& law, const Sample& begin,
+                     const Sample& end) SHIFTRIG_REALTIME {
+    if (flank_side(w.contact[law.device]) != 0) return 1;
+    const double h = end.at.time - begin.at.time;
+    const auto [from, from_rate] = twist_of(w.model, law, begin);
+    const auto [to, to_rate] = twist_of(w.model, law, end);
+    // φ = from + θ (c + θ (b + θ a)); its rate vanishes at two θ.
+    const double c = from_rate * h, a = c + to_rate * h - 2 * (to - from), b = to - from - c - a;
+    const double root = b * b - 3 * a * c;
+    if (root <= 0) return 1;
+    const double q = -(b + std::copysign(std::sqrt(root), b));
+    double first = 1;
+    for (const double theta : {q / (3 * a), c / q}) {
+        if (!(theta > 1e-3 && theta < first)) continue;
+        const double twist = from + theta * (c + theta * (b + theta * a)), side = twist < 0 ? -1 : 1;
+        if (side * twist > law.half_gap && side * to < law.half_gap) first = theta;
+    }
+    return first;
 }
 
 bool flanks_hold(const Work& w, const Sample& end) SHIFTRIG_REALTIME {

@@ -16,7 +16,8 @@ template <typename Links>
 double scaled_column(const ModelData& m, const Links& links, double* column) {
     std::fill(column, column + m.masses, 0.);
     for (const Link& link : links) {
-        if (link.mass >= 0) column[link.mass] += link.factor / m.root_inertia[static_cast<std::size_t>(link.mass)];
+        if (link.mass >= 0)
+            column[link.mass] += link.factor / m.root_inertia[static_cast<std::size_t>(link.mass)];
     }
     const double length = std::sqrt(dot(column, column, m.masses));
     for (int j = 0; j < m.masses; ++j) column[j] /= length;
@@ -134,7 +135,9 @@ int workspace_doubles(const ModelData& m) noexcept {
     return std::max(mode, exponential) + 64;
 }
 
-int workspace_integers(const ModelData& m) noexcept { return m.masses; }
+int workspace_integers(const ModelData& m) noexcept {
+    return m.masses;
+}
 
 void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers) SHIFTRIG_REALTIME {
     const Structure& s = m.structure;
@@ -175,7 +178,8 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
         const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
         if (!mesh.lossy() || mesh_key(k) != 0 || mode.bound[m.pairs + k]) continue;
         scaled_column(m, mesh.motion(), column);
-        if (extend_basis(mode.basis, mode.rank, n, column)) mode.rows[mode.row_count++] = m.pairs + m.meshes + k;
+        if (extend_basis(mode.basis, mode.rank, n, column))
+            mode.rows[mode.row_count++] = m.pairs + m.meshes + k;
     }
     for (int k = 0; k < m.pairs; ++k) {
         scaled_column(m, s.pairs[static_cast<std::size_t>(k)].links, column);
@@ -197,7 +201,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
     double* transmission = g + m.torques * m.torques;  // T̂, rows × masses
     double* right = transmission + rows * n;
     double* square = right + rows * n;
-    double* b = square + m.torques * m.torques;         // B, masses × masses, padded
+    double* b = square + m.torques * m.torques;  // B, masses × masses, padded
     double* scale = b + padded(n) * n;
     for (int r = 0; r < rows; ++r) {
         const int unknown = mode.rows[r];
@@ -277,8 +281,8 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
 
     // L, S̃, R: every elastic element and every force is a column of torques on the masses.
     const int states = m.states_padded, torque_rows = padded(rows);
-    double* motion = scale + m.torques;               // [L S̃], states × columns
-    double* torque = motion + states * m.columns;     // [R_z R_f]
+    double* motion = scale + m.torques;            // [L S̃], states × columns
+    double* torque = motion + states * m.columns;  // [R_z R_f]
     double* response = torque + torque_rows * m.columns;
     double* reaction = response + states;
     std::fill(motion, motion + states * m.columns, 0.);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "plant/modes.h"
+#include "plant/rest_problem.h"
 
 namespace shiftrig::plant {
 namespace detail {
@@ -74,6 +75,7 @@ ScratchData::ScratchData(const ModelData& m) {
     work = works.data()->value;
     workspace.assign(static_cast<std::size_t>(m.tree ? TreeWork::doubles(m) : workspace_doubles(m)), 0.);
     if (m.tree) return;
+    standstill.assign(static_cast<std::size_t>(rest_workspace(m)), 0.);
     workspace_index.assign(static_cast<std::size_t>(workspace_integers(m)), 0);
     for (auto* memory : {&operator_memory, &ledger_memory}) {
         *memory = aligned_doubles(static_cast<std::size_t>(ModeSizes(m).operators));
@@ -90,7 +92,7 @@ Scratch& Scratch::operator=(Scratch&&) noexcept = default;
 void Scratch::fill_with_nan() noexcept {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     detail::ScratchData& s = *data_;
-    for (auto* numbers : {&s.torque_copy, &s.held, &s.workspace}) {
+    for (auto* numbers : {&s.torque_copy, &s.held, &s.workspace, &s.standstill}) {
         std::fill(numbers->begin(), numbers->end(), nan);
     }
     for (auto* lines : {&s.buffer, &s.vectors, &s.works, &s.operator_memory, &s.ledger_memory}) {

@@ -95,7 +95,8 @@ struct ScratchData {
     double dissipated = 0, input_work = 0;  // in this step [J]
     double stored_before = 0, stored = 0;   // at its beginning, at its end [J]
     double viscosity = 0, oil_temperature = 0;
-    std::vector<double> workspace;  // of the mode builder
+    std::vector<double> workspace;   // of the mode builder
+    std::vector<double> standstill;  // of rearrange(), which builds modes on its way
     std::vector<int> workspace_index;
     AlignedDoubles operator_memory, ledger_memory;  // operators of a partial step, of a part of one
     const Mode* begin_groups = nullptr;             // mode in which the tree's begin.groups hold for `begin`

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plant/standstill.h"
 #include "plant/stuck_meshes.h"
 
 namespace shiftrig::plant::detail {
@@ -46,13 +47,6 @@ bool engage_and_release(Work& w, Sample& s) {
     }
     if (changed) contact_forces(w, w.contact, s);
     return changed;
-}
-
-// The sense in which a locked pair begins to slip: that of its torque. A freewheel that lets go does so at next to none.
-double opening_sense(const Work& w, int pair, double torque) {
-    const FreewheelLaw* law = freewheel_of(w, pair);
-    if (!law) return torque;
-    return is_next_to_overrun(*law, torque) ? -law->sense : law->sense;
 }
 
 // Closings are told with the torques that they lead to.
@@ -173,7 +167,8 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
             if (release_stuck_meshes(w, mode, s) || leave_to_pairs(w, mode, s)) continue;
             const Use worst = most_used(w, w.contact, s);
             if (is_overloaded(w, worst.pair, s)) {
-                if (!lean_on_losses(w, mode, worst.share, s)) open_pair(w, mode, worst.pair, s);
+                if (lean_on_losses(w, mode, worst.share, s)) continue;
+                if (rearrange(w, worst.pair, s) == Rearrangement::none) open_pair(w, mode, worst.pair, s);
                 continue;
             }
         }

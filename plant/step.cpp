@@ -123,6 +123,12 @@ double approach_flank(Work& w, const Mode& mode, const Crossing& crossing, doubl
     return high;
 }
 
+double approach_any(Work& w, const Mode& mode, const Crossing& crossing, double done,
+                    double until) SHIFTRIG_REALTIME {
+    return crossing.change == Change::flank ? approach_flank(w, mode, crossing, done, until)
+                                            : approach(w, mode, crossing, done, until);
+}
+
 }  // namespace
 
 void step(const Model& model, Operators& operators, State& state, const Inputs& inputs, Outputs& outputs,
@@ -173,8 +179,14 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         if (inside && !acts_by_itself(first.change) && first.theta * (until - done) < instant) {
             reached = done;
         } else if (inside && first.theta < 1 - instant) {
-            reached = first.change == Change::flank ? approach_flank(w, *mode, first, done, until)
-                                                    : approach(w, *mode, first, done, until);
+            reached = approach_any(w, *mode, first, done, until);
+            // An estimate that came too late passed over another change, which goes first.
+            for (int passed = 0; passed < 2; ++passed) {
+                const Crossing earlier = first_crossing(w, *mode, s.begin, s.end);
+                if (earlier.device < 0 || earlier.device == first.device || earlier.theta > 0.999) break;
+                first = earlier;
+                reached = approach_any(w, *mode, first, done, reached);
+            }
         }
 
         // Energy ledger of the accepted part.

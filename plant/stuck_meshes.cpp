@@ -6,6 +6,7 @@
 
 #include "plant/dense.h"
 #include "plant/settling.h"
+#include "plant/standstill.h"
 
 namespace shiftrig::plant::detail {
 namespace {
@@ -167,10 +168,12 @@ bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         const int x = s.torque[device] * direction < 0 ? -1 : 1;
         double least = overload;
         int taker = -1;
+        bool asked = false;
         for (int k = 0; k < m.pairs; ++k) {
             if (!slips(w.contact[k]) || !mode.bound[k] || w.scratch.overcome[static_cast<std::size_t>(k)])
                 continue;
             if (std::fabs(device_slip(w, k, s.z)) > at_rest) continue;
+            asked = true;
             std::copy(w.contact, w.contact + m.contact_bytes, trial);
             trial[device] = moving(direction, x);
             trial[k] = locked;
@@ -189,6 +192,7 @@ bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         contact_forces(w, w.contact, s);
         if (taker >= 0) return true;
         internal_torques(w, mode, s);
+        if (asked && rearrange(w, -1, s) != Rearrangement::none) return true;
     }
     return false;
 }

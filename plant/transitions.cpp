@@ -6,6 +6,7 @@
 #include "plant/flanks.h"
 #include "plant/ledger.h"
 #include "plant/settling.h"
+#include "plant/standstill.h"
 
 namespace shiftrig::plant::detail {
 namespace {
@@ -129,7 +130,9 @@ bool change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
     } else if (device < w.model.pairs && w.contact[device] == locked) {
         const Mode& mode = find_mode(w.model, w.operators, w.contact, w.scratch);
         if (lean_on_losses(w, mode, most_used(w, w.contact, s).share, s)) return false;
-        open_pair(w, mode, device, s);
+        const Rearrangement found = rearrange(w, device, s);
+        if (found == Rearrangement::none) open_pair(w, mode, device, s);
+        return found != Rearrangement::stands;
     } else {
         close_device(w, device, s);
     }

@@ -208,6 +208,33 @@ TEST(RandomSystems, WithFreewheelsAgreeWithTheReferenceSolver) {
     EXPECT_GE(agreeing, compared - 2);
 }
 
+// Closed loops of pairs and lossy meshes at rest, where it takes several devices together to see what moves: two pairs
+// with the mesh between them (3043), a pair driven back by others that engage (610), a pair that breaks away before another
+// that could hold (203, 521), freewheels whose share of a load has no sign of its own (324, 388, 536), changes within one step that
+// come in another order than their first estimates (957, 1180).
+TEST(RandomSystems, LoopsAtRestLetGoTogether) {
+    const ComparisonOptions options;
+    const auto check = [&](const RandomSystem& system, std::uint64_t seed) {
+        const Comparison c = compare(system, seed, options);
+        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
+        EXPECT_EQ(name(c.outcome), std::string("agrees"))
+            << "seed " << seed << ": " << c.worst << " tolerances";
+        EXPECT_EQ(c.fall_backs, 0) << "seed " << seed;
+    };
+    for (const std::uint64_t seed : {3043u, 610u, 203u, 521u})
+        check(random_system(seed, options.seconds), seed);
+    for (const std::uint64_t seed : {324u, 388u, 536u, 957u, 1180u})
+        check(random_system_with_freewheels(seed, options.seconds), seed);
+}
+
+// Power that turns from no torque at all in the midst of a step: a clutch that begins to press along a sine.
+TEST(RandomSystems, PowerTurnsWhereAClutchBeginsToPress) {
+    const ComparisonOptions options;
+    const Comparison c = compare(random_system(9125, options.seconds), 9125, options);
+    EXPECT_EQ(name(c.outcome), std::string("agrees"));
+    EXPECT_LT(c.worst, 0.01);
+}
+
 TEST(RandomSystems, WithBacklashesAgreeWithTheReferenceSolver) {
     const ComparisonOptions options;
     int agreeing = 0, compared = 0, backlashes = 0;

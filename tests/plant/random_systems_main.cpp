@@ -20,13 +20,16 @@ struct Arguments {
     std::uint64_t seed = 1;
     std::vector<std::uint64_t> seeds;  // instead of count and seed
     ComparisonOptions options;
+    RandomSystem (*make)(std::uint64_t, double) = random_system;
     bool verbose = false;
 };
 
 const char usage[] =
-    "usage: shiftrig_random_systems [--count N] [--seed S | --seeds A,B,…] [--seconds T] [--jobs J] [--substeps K] "
-    "[--verbose]\n"
-    "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --verbose prints each that does "
+    "usage: shiftrig_random_systems [--count N] [--seed S | --seeds A,B,…] [--seconds T] [--jobs J] "
+    "[--substeps K] "
+    "[--kind plain|freewheels|backlashes] [--verbose]\n"
+    "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --verbose prints each "
+    "that does "
     "not agree\n";
 
 std::vector<std::uint64_t> numbers(const char* list) {
@@ -56,6 +59,12 @@ bool parse(int argc, char** argv, Arguments& a) {
             a.options.steps_per_sample = std::atoi(value);
         else if (key == "--jobs")
             a.jobs = std::atol(value);
+        else if (key == "--kind" && value == std::string("plain"))
+            a.make = random_system;
+        else if (key == "--kind" && value == std::string("freewheels"))
+            a.make = random_system_with_freewheels;
+        else if (key == "--kind" && value == std::string("backlashes"))
+            a.make = random_system_with_backlashes;
         else
             return false;
     }
@@ -78,9 +87,10 @@ int main(int argc, char** argv) {
     long fall_backs = 0, events = 0;
     const auto work = [&] {
         for (long i; (i = next++) < arguments.count;) {
-            const std::uint64_t seed = arguments.seeds.empty() ? arguments.seed + static_cast<std::uint64_t>(i)
-                                                               : arguments.seeds[static_cast<std::size_t>(i)];
-            const RandomSystem system = random_system(seed, arguments.options.seconds);
+            const std::uint64_t seed = arguments.seeds.empty()
+                                           ? arguments.seed + static_cast<std::uint64_t>(i)
+                                           : arguments.seeds[static_cast<std::size_t>(i)];
+            const RandomSystem system = arguments.make(seed, arguments.options.seconds);
             Comparison c;
             try {
                 c = compare(system, seed, arguments.options);
@@ -105,7 +115,8 @@ int main(int argc, char** argv) {
             for (const auto& line : c.broken) std::printf("    %s\n", line.c_str());
             if (arguments.verbose) {
                 std::fputs(describe(system.description).c_str(), stdout);
-                std::fputs(timelines(system.description, arguments.options, c.worst_time + 2e-3).c_str(), stdout);
+                std::fputs(timelines(system.description, arguments.options, c.worst_time + 2e-3).c_str(),
+                           stdout);
             }
             std::fflush(stdout);
         }

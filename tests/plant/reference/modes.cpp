@@ -168,8 +168,11 @@ Response Responses::build(const Mode& mode) const {
         Eigen::CompleteOrthogonalDecomposition<Matrix> decomposition;
         decomposition.setThreshold(dependent);
         decomposition.compute(c);
-        response.projector -= root.asDiagonal() * (c * decomposition.pseudoInverse()) *
-                              root.cwiseInverse().asDiagonal();
+        response.projector -=
+            root.asDiagonal() * (c * decomposition.pseudoInverse()) * root.cwiseInverse().asDiagonal();
+        // Rounding of a solution whose torques are huge beside what they leave of a light body's acceleration would make
+        // drift what stands still.
+        response.acceleration = (response.projector * response.acceleration).eval();
     }
     return response;
 }

@@ -1,0 +1,76 @@
+#include "plant/complementarity.h"
+
+#include <cmath>
+
+namespace shiftrig::plant::detail {
+namespace {
+
+constexpr double nothing = 1e-11;  // of numbers of the order of 1: rounding
+
+void pivot(double* tableau, int size, int row, int column) {
+    const int columns = lemke_columns(size);
+    double* const chosen = tableau + row * columns;
+    const double inverse = 1 / chosen[column];
+    for (int c = 0; c < columns; ++c) chosen[c] *= inverse;
+    chosen[column] = 1;
+    for (int r = 0; r < size; ++r) {
+        double* const other = tableau + r * columns;
+        const double factor = other[column];
+        if (r == row || factor == 0) continue;
+        for (int c = 0; c < columns; ++c) other[c] -= factor * chosen[c];
+        other[column] = 0;
+    }
+}
+
+// Does row a leave before row b, if a variable enters that takes `rate` of each? Ties are broken by what w would
+// give (lexicographically), so that no basis comes back.
+bool leaves_before(const double* a, double rate_a, const double* b, double rate_b, int size) {
+    const int last = lemke_columns(size) - 1;
+    const double difference = a[last] / rate_a - b[last] / rate_b;
+    if (std::fabs(difference) > nothing) return difference < 0;
+    for (int c = 0; c < size; ++c) {
+        const double by_column = a[c] / rate_a - b[c] / rate_b;
+        if (std::fabs(by_column) > nothing) return by_column < 0;
+    }
+    return false;
+}
+
+}  // namespace
+
+bool solve_complementarity(double* tableau, int* basis, int size) SHIFTRIG_REALTIME {
+    const int columns = lemke_columns(size), artificial = 2 * size, last = columns - 1;
+    int row = -1;
+    for (int r = 0; r < size; ++r) {
+        basis[r] = r;
+        double* const line = tableau + r * columns;
+        line[artificial] = -1;
+        if (line[last] < 0 && (row < 0 || line[last] <= tableau[row * columns + last])) row = r;
+    }
+    if (row < 0) return true;
+    int entering = artificial;
+    const int most = 3 * size + 16;  // machines at rest need fewer than `size`
+    for (int pivots = 0; pivots < most; ++pivots) {
+        pivot(tableau, size, row, entering);
+        const int leaving = basis[row];
+        basis[row] = entering;
+        if (leaving == artificial) return true;
+        entering = leaving < size ? leaving + size : leaving - size;  // the leaving one's complement
+        row = -1;
+        for (int r = 0; r < size; ++r) {
+            const double* const line = tableau + r * columns;
+            const double rate = line[entering];
+            if (rate <= nothing) continue;
+            const double* const best = tableau + row * columns;
+            const bool sooner = row < 0 || leaves_before(line, rate, best, best[entering], size);
+            const bool ends = basis[r] == artificial && row >= 0 &&
+                              line[last] / rate <= best[last] / best[entering] + nothing;
+            const bool kept = row >= 0 && basis[row] == artificial &&
+                              best[last] / best[entering] <= line[last] / rate + nothing;
+            if ((sooner && !kept) || ends) row = r;
+        }
+        if (row < 0) return false;
+    }
+    return false;
+}
+
+}  // namespace shiftrig::plant::detail

@@ -1,0 +1,325 @@
+#include "plant/rest_problem.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plant/complementarity.h"
+#include "plant/dense.h"
+#include "plant/devices.h"
+
+namespace shiftrig::plant::detail {
+namespace {
+
+constexpr double most_give = 1e-5;  // of the mobility, where loads are shared out
+
+int most_devices(const ModelData& m) {
+    return std::min(most_joints, m.pairs + static_cast<int>(m.lossy_meshes.size()));
+}
+
+template <typename Links>
+void set_column(const ModelData& m, const Links& links, double* column, double sign = 1) {
+    std::fill(column, column + m.masses, 0.);
+    for (const Link& link : links) {
+        if (link.mass >= 0)
+            column[link.mass] += sign * link.factor / m.root_inertia[static_cast<std::size_t>(link.mass)];
+    }
+}
+
+std::array<Link, 2> loss_links(const Mesh& mesh) {
+    return {Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}};
+}
+
+// Hands out `memory`, if there is any; returns how much of it that takes.
+int place(const ModelData& m, RestProblem& rest, double* memory) {
+    const int n = most_devices(m), bends = std::min(n, static_cast<int>(m.lossy_meshes.size()));
+    const int size = 2 * n + 2 * bends;
+    int used = 0;
+    const auto take = [&](double*& part, int doubles) {
+        part = memory ? memory + used : nullptr;
+        used += doubles;
+    };
+    take(rest.free, m.masses * (1 + n));
+    take(rest.motion, m.masses * n);
+    take(rest.mesh, m.meshes * (1 + n));
+    take(rest.columns, m.masses * m.meshes);
+    take(rest.forces, m.masses * m.meshes);
+    take(rest.g, m.meshes * m.meshes);
+    for (double** part : {&rest.w, &rest.response, &rest.turn, &rest.left}) take(*part, n * n);
+    take(rest.inverse, n * (n + 1));
+    for (double** part : {&rest.b, &rest.y, &rest.torque}) take(*part, n);
+    take(rest.tableau, size * lemke_columns(size));
+    return used;
+}
+
+// Everything at rest; false: too much.
+bool list_joints(const Work& w, const Mode& mode, const Sample& s, RestProblem& rest) {
+    const ModelData& m = w.model;
+    for (int k = 0; k < m.first_flank; ++k) {
+        const unsigned char state = w.contact[k];
+        const bool closed = k < m.pairs ? state == locked : state == stuck;
+        if (k < m.pairs ? state == free_running : !mesh_of(w, k - m.pairs).lossy()) continue;
+        if (!closed && !is_still(w, mode, k, s)) continue;
+        if (rest.count == most_devices(m)) return false;
+        RestJoint& joint = rest.joints[rest.count++];
+        joint = {.device = k};
+        if (k < m.pairs) continue;
+        const Mesh& mesh = mesh_of(w, k - m.pairs);
+        joint.mesh = k - m.pairs;
+        joint.bend = rest.bends++;
+        joint.upper = mesh.forward_bearing;
+        joint.lower = -mesh.forward_bearing;
+        joint.slope = 1 - mesh.forward_efficiency;
+        joint.difference = loss_difference(mesh);
+        joint.kink = loss_kink(w, joint.mesh, 1);
+    }
+    return true;
+}
+
+// M̃ without the devices at rest: the sample's forces are those with all of them closed.
+void free_torques(const Work& w, const Mode& mode, const Sample& s, double* torque) {
+    const ModelData& m = w.model;
+    std::fill(torque, torque + m.masses, 0.);
+    const auto act = [&](const std::array<Link, 2>& links, double effort) {
+        for (const Link& link : links) {
+            if (link.mass >= 0)
+                torque[link.mass] -=
+                    link.factor * effort / m.root_inertia[static_cast<std::size_t>(link.mass)];
+        }
+    };
+    for (int k = 0; k < m.forces; ++k) act(m.force_columns[static_cast<std::size_t>(k)], s.f[k]);
+    for (int e = 0; e < m.twists; ++e) {
+        const Elastic& shaft = m.structure.shafts[static_cast<std::size_t>(e)];
+        if (!is_shaft_closed(m, mode, e)) continue;
+        act(shaft.links, shaft.stiffness * s.z[m.masses + e] + shaft.damping * slip_of(shaft.links, s.z));
+    }
+    for (const Elastic& damper : m.structure.dampers)
+        act(damper.links, damper.damping * slip_of(damper.links, s.z));
+}
+
+// b, W and the meshes' torques; false where the meshes alone leave their torques open, or hold a pair.
+bool set_up(const Work& w, const Mode& mode, const Sample& s, RestProblem& rest) {
+    const ModelData& m = w.model;
+    const int n = m.masses, count = rest.count, meshes = m.meshes;
+    free_torques(w, mode, s, rest.free);
+    for (int i = 0; i < count; ++i) {
+        const int k = rest.joints[i].device;
+        double* const pull = rest.free + (1 + i) * n;
+        if (k < m.pairs) {
+            set_column(m, pair_links(w, k), rest.motion + i * n);
+            set_column(m, pair_links(w, k), pull, -1);
+        } else {
+            set_column(m, mesh_of(w, k - m.pairs).motion(), rest.motion + i * n);
+            set_column(m, loss_links(mesh_of(w, k - m.pairs)), pull, -1);
+        }
+    }
+    for (int k = 0; k < meshes; ++k) {
+        const Mesh& mesh = mesh_of(w, k);
+        bool rests = false;
+        for (int i = 0; i < count; ++i) rests = rests || rest.joints[i].device == m.pairs + k;
+        double* const column = rest.columns + k * n;  // of length 1
+        set_column(m, mesh.column(mesh.ratio), column);
+        const double length = std::sqrt(dot(column, column, n));
+        for (int j = 0; j < n; ++j) column[j] /= length;
+        const int x = rests || !mesh.lossy() ? 0 : loss_exponent(w.contact[m.pairs + k]);
+        set_column(m, mesh.column(mesh.force_ratio(x)), rest.forces + k * n);
+    }
+    for (int c = 0; c <= count; ++c) {
+        for (int k = 0; k < meshes; ++k)
+            rest.mesh[c * meshes + k] = dot(rest.columns + k * n, rest.free + c * n, n);
+    }
+    double largest = 0;
+    for (int k = 0; k < meshes; ++k) {
+        for (int l = 0; l < meshes; ++l) {
+            double& g = rest.g[l * meshes + k];
+            g = dot(rest.columns + k * n, rest.forces + l * n, n);
+            largest = std::max(largest, std::fabs(g));
+        }
+    }
+    solve(rest.g, meshes, rest.mesh, 1 + count);
+    for (int k = 0; k < meshes; ++k) {  // the pivots
+        if (!(std::fabs(rest.g[k * meshes + k]) > 1e-10 * largest)) return false;
+    }
+    for (int c = 0; c <= count; ++c) {
+        for (int k = 0; k < meshes; ++k)
+            add_scaled(rest.free + c * n, -rest.mesh[c * meshes + k], rest.forces + k * n, n);
+    }
+    for (int i = 0; i < count; ++i) {
+        const double* const motion = rest.motion + i * n;
+        rest.b[i] = dot(motion, rest.free, n);
+        for (int j = 0; j < count; ++j) rest.w[i * count + j] = -dot(motion, rest.free + (1 + j) * n, n);
+        const double mobility = rest.w[i * count + i];
+        if (!(mobility > 1e-12 * dot(motion, motion, n))) return false;
+        rest.joints[i].scale = std::sqrt(mobility);
+    }
+    // The weights of build_mode().
+    double heaviest = 0, most = 0;
+    for (const FrictionPair& pair : m.structure.pairs) heaviest = std::max(heaviest, pair.nominal_capacity);
+    for (int pass = 0; pass < 2; ++pass) {
+        for (int i = 0; i < count; ++i) {
+            RestJoint& joint = rest.joints[i];
+            const double weight =
+                joint.mesh < 0 ? m.structure.pairs[static_cast<std::size_t>(joint.device)].nominal_capacity
+                               : 1e-3 * (heaviest > 0 ? heaviest : 1);
+            const double give = 1 / (weight * joint.scale * joint.scale);
+            most = std::max(most, give);
+            joint.give = most_give * give / most;
+        }
+    }
+    return true;
+}
+
+}  // namespace
+
+bool is_still(const Work& w, const Mode& mode, int device, const Sample& s) SHIFTRIG_REALTIME {
+    return mode.bound[device] != 0 ||
+           std::fabs(device_slip(w, device, s.z)) <= 1e-13 * slip_scale(w, device, s.z);
+}
+
+bool pose_rest_problem(Work& w, const Mode& mode, Sample& s, RestProblem& rest) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    if (mode.tree) return false;
+    place(m, rest, w.scratch.standstill.data());
+    if (!list_joints(w, mode, s, rest) || rest.count == 0) return false;
+    unsigned char* const closed = w.scratch.trial.data();
+    std::copy(w.contact, w.contact + m.contact_bytes, closed);
+    for (int i = 0; i < rest.count; ++i) closed[rest.joints[i].device] = 0;  // locked, stuck
+    contact_forces(w, closed, s);
+    const bool posed = set_up(w, mode, s, rest);
+    contact_forces(w, w.contact, s);
+    return posed;
+}
+
+bool solve_rest_problem(const ModelData& m, bool shared_out, RestProblem& rest) SHIFTRIG_REALTIME {
+    const int count = rest.count, meshes = m.meshes, size = rest.size(), columns = lemke_columns(size);
+    const auto row_of = [&](const double* matrix, int i) { return matrix + i * count; };
+    // (I − H C) y = H M_0 + o + δ v − p, where M = M_0 + C y and H holds the slopes.
+    for (int i = 0; i < count; ++i) {
+        const RestJoint& joint = rest.joints[i];
+        for (int j = 0; j < count; ++j) {
+            const double follows = joint.mesh < 0 ? 0 : rest.mesh[(1 + j) * meshes + joint.mesh];
+            rest.left[j * count + i] = (i == j ? 1 : 0) - joint.slope * follows;
+            rest.inverse[j * count + i] = i == j ? 1 : 0;
+        }
+        rest.inverse[count * count + i] =
+            joint.upper + (joint.mesh < 0 ? 0 : joint.slope * rest.mesh[joint.mesh]);
+    }
+    solve(rest.left, count, rest.inverse, count + 1);
+    std::copy(rest.inverse + count * count, rest.inverse + count * (count + 1), rest.y);
+    for (int i = 0; i < count; ++i) {
+        for (int j = 0; j < count; ++j) rest.response[i * count + j] = rest.inverse[j * count + i];
+    }
+    const auto mobility = [&](int i, int j) {
+        const double w = rest.w[i * count + j];
+        return shared_out && i == j ? w * (1 + rest.joints[i].give) : w;
+    };
+    const auto turns = [&](int mesh, int j) {
+        double sum = 0;
+        for (int l = 0; l < count; ++l)
+            sum += rest.mesh[(1 + l) * meshes + mesh] * rest.response[l * count + j];
+        return sum;
+    };
+    double largest = 0;  // rows are counted in it: numbers of one size
+    for (int i = 0; i < count; ++i) {
+        const RestJoint& joint = rest.joints[i];
+        rest.torque[i] = 0;
+        largest = std::max({largest, std::fabs(rest.b[i]) / joint.scale, std::fabs(rest.y[i]) * joint.scale});
+        if (joint.mesh < 0) continue;
+        rest.torque[i] = rest.mesh[joint.mesh];
+        for (int j = 0; j < count; ++j) {
+            rest.torque[i] += rest.mesh[(1 + j) * meshes + joint.mesh] * rest.y[j];
+            rest.turn[i * count + j] = turns(joint.mesh, j);
+        }
+        largest = std::max(largest, std::fabs(rest.torque[i]) * joint.scale);
+    }
+    if (!(largest > 0)) return false;
+    std::fill(rest.tableau, rest.tableau + size * columns, 0.);
+    const int bends = rest.bends;
+    for (int i = 0; i < count; ++i) {
+        const RestJoint& joint = rest.joints[i];
+        const int bend = joint.bend;
+        // Of w_r = N z + q the entries of −N at p_j, and at v_j, which acts like −δ_j p_j.
+        const auto set_row = [&](int r, const auto& entry, double constant, double unit) {
+            double* const row = rest.tableau + r * columns;
+            row[r] = 1;
+            for (int j = 0; j < count; ++j) {
+                const RestJoint& other = rest.joints[j];
+                const double value = entry(j) * unit / other.scale;  // of −p_j
+                row[size + j] = value;
+                if (other.bend >= 0) row[size + 2 * count + other.bend] = -other.difference * value;
+            }
+            row[columns - 1] = constant * unit / largest;
+            return row;
+        };
+        double acceleration = rest.b[i];
+        for (int j = 0; j < count; ++j) acceleration -= mobility(i, j) * rest.y[j];
+        double* const slip = set_row(
+            i,
+            [&](int j) {
+                double gain = 0;
+                for (int l = 0; l < count; ++l) gain += mobility(i, l) * rest.response[l * count + j];
+                return -gain;
+            },
+            acceleration, 1 / joint.scale);
+        slip[size + count + i] = -1;  // β
+        const double *const response = row_of(rest.response, i), *const turn = row_of(rest.turn, i);
+        double low = joint.lower;
+        if (bend >= 0) low += joint.slope * rest.torque[i];
+        double* const room = set_row(
+            count + i, [&](int j) { return response[j] - (bend < 0 ? 0 : joint.slope * turn[j]); },
+            rest.y[i] - low, joint.scale);
+        if (bend < 0) continue;
+        room[size + 2 * count + bends + bend] = -joint.difference;  // v'
+        double* const ahead = set_row(
+            2 * count + bend, [&](int j) { return turn[j]; }, rest.torque[i] - joint.kink, joint.scale);
+        double* const behind = set_row(
+            2 * count + bends + bend, [&](int j) { return -turn[j]; }, -rest.torque[i] - joint.kink,
+            joint.scale);
+        ahead[size + 2 * count + bend] -= 1;
+        behind[size + 2 * count + bends + bend] -= 1;
+    }
+    if (!solve_complementarity(rest.tableau, rest.basis, size)) return false;
+    for (int r = 0; r < size; ++r) {
+        const int z = rest.basis[r] - size;  // p_j or v_j
+        const double value = rest.tableau[r * columns + columns - 1] * largest;
+        for (int j = 0; j < count; ++j) {
+            const RestJoint& other = rest.joints[j];
+            double gives = 0;
+            if (z == j) gives = -value / other.scale;
+            if (other.bend >= 0 && z == 2 * count + other.bend)
+                gives = other.difference * value / other.scale;
+            if (gives == 0) continue;
+            for (int i = 0; i < count; ++i) {
+                rest.y[i] += rest.response[i * count + j] * gives;
+                if (rest.joints[i].bend >= 0) rest.torque[i] += rest.turn[i * count + j] * gives;
+            }
+        }
+    }
+    return true;
+}
+
+int side_of(const RestProblem& rest, int i, double& going) SHIFTRIG_REALTIME {
+    const int count = rest.count, size = rest.size(), columns = lemke_columns(size);
+    double forward = -1, backward = -1;  // not in the basis
+    for (int r = 0; r < size; ++r) {
+        const double value = std::max(rest.tableau[r * columns + columns - 1], 0.);
+        if (rest.basis[r] == i) forward = value;
+        if (rest.basis[r] == size + count + i) backward = value;
+    }
+    going = std::max({forward, backward, 0.});
+    if (forward < 0 && backward < 0) return 0;
+    return forward >= backward ? 1 : -1;
+}
+
+unsigned char state_of(const RestProblem& rest, int i, int side) SHIFTRIG_REALTIME {
+    const RestJoint& joint = rest.joints[i];
+    if (joint.mesh < 0) return side == 0 ? static_cast<unsigned char>(locked) : slipping(side);
+    if (side == 0) return stuck;
+    return moving(side, (rest.torque[i] - side * joint.kink) * side < 0 ? -1 : 1);
+}
+
+int rest_workspace(const ModelData& m) noexcept {
+    RestProblem rest;
+    return place(m, rest, nullptr);
+}
+
+}  // namespace shiftrig::plant::detail

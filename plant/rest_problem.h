@@ -1,0 +1,80 @@
+// Pairs and lossy meshes at rest as a linear complementarity problem. Internal to plant/.
+//
+// In J^(−1/2)-scaled speeds, with A and Â the columns of all meshes (those at rest without loss), c_i and ĉ_i those of the
+// devices at rest i, y_i their torques (of a mesh: its loss torque):
+//
+//   M = G⁻¹ Aᵀ (M̃ − Σ ĉ_i y_i),  G = Aᵀ Â                torques of the meshes, [Algin] eq. (15)
+//   a_i = c_iᵀ (M̃ − Â M − Σ ĉ_j y_j) = b_i − Σ W_ij y_j   accelerations of the slips
+//   y_i = upper − p_i = lower + r_i                        p, r ≥ 0: what is left of the limits on both sides
+//   a_i = α_i − β_i,  α_i p_i = 0,  β_i r_i = 0            forward only at the upper limit, backward only at the lower
+//
+// The limits of a pair are ± its capacity, those of a mesh f(M) and −f(−M), where M is its torque and f the larger of two lines: on
+// its first link the loss is (1 − η) M + o if that drives, (1 − 1/η') M + o' if it is driven. With κ where they cross,
+// δ = 1/η' − η and
+//
+//   M − κ = u − v,  u v = 0,   f(M) = (1 − η) M + o + δ v,   likewise u', v' for −M
+//
+// everything is linear but for the products. Eliminating y leaves w − N z = q for w = (α, r, u, u'), z = (p, β, v, v').
+#pragma once
+
+#include "plant/forces.h"
+
+namespace shiftrig::plant::detail {
+
+constexpr int most_joints = 16;
+
+// A pair or a mesh at rest.
+struct RestJoint {
+    int device = -1;
+    int mesh = -1;                // its number among all meshes, −1: a pair
+    int bend = -1;                // its number among the meshes at rest
+    double upper = 0, lower = 0;  // limits of a pair, set by whoever asks; of a mesh o and −o
+    double slope = 0;             // 1 − η
+    double difference = 0;        // δ
+    double kink = 0;              // κ
+    double scale = 1;             // √W_ii: torques are counted in 1/scale, accelerations in scale
+    double give = 0;              // of W_ii, where loads are shared out
+};
+
+struct RestProblem {
+    RestJoint joints[most_joints];
+    int count = 0, bends = 0;
+    int basis[4 * most_joints];
+    double* free = nullptr;    // J^(−1/2) M̃, then per joint −J^(−1/2) ĉ; masses × (1 + joints)
+    double* motion = nullptr;  // J^(−1/2) c, masses × joints
+    double* mesh = nullptr;    // M: meshes × (1 + joints)
+    double *columns = nullptr, *forces = nullptr;  // J^(−1/2) A, Â: masses × meshes
+    double* g = nullptr;                           // G
+    double* w = nullptr;                           // W, joints × joints, by rows like the next two
+    double* response = nullptr;                    // of y to what a limit gives, joints × joints
+    double* turn = nullptr;                        // of M to it, of meshes at rest
+    double *left = nullptr, *inverse = nullptr;
+    double *b = nullptr, *y = nullptr, *torque = nullptr;  // M of meshes at rest, at y
+    double* tableau = nullptr;
+
+    int size() const { return 2 * count + 2 * bends; }
+};
+
+// Is the device at rest at the sample, by others' doing or by itself?
+bool is_still(const Work& work, const Mode& mode, int device, const Sample& sample) SHIFTRIG_REALTIME;
+
+// The problem of everything at rest at the sample, in scratch.standstill. False: nothing is, too much is, or the torques of meshes
+// in a ring of their own are not unique.
+bool pose_rest_problem(Work& work, const Mode& mode, Sample& sample, RestProblem& rest) SHIFTRIG_REALTIME;
+
+// Solves it with the limits as they stand; leaves the torques of its solution in y and `torque`. `shared_out`: every
+// joint gives a little under its torque, the less the larger its nominal capacity. Of all splits of a load that is not unique
+// that is the one which the mode of the same states has. False: no solution was found.
+bool solve_rest_problem(const ModelData& model, bool shared_out, RestProblem& rest) SHIFTRIG_REALTIME;
+
+// Where joint i of the solution is: 0 within its limits, +1 at the upper one, −1 at the lower one. `going`: its acceleration,
+// as a share of what there could be.
+int side_of(const RestProblem& rest, int i, double& going) SHIFTRIG_REALTIME;
+
+// The contact state of joint i there.
+unsigned char state_of(const RestProblem& rest, int i, int side) SHIFTRIG_REALTIME;
+
+// Doubles of working memory.
+int rest_workspace(const ModelData& model) noexcept;
+
+}  // namespace shiftrig::plant::detail

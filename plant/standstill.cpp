@@ -1,0 +1,198 @@
+#include "plant/standstill.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plant/devices.h"
+#include "plant/rest_problem.h"
+#include "plant/settling.h"
+#include "plant/stuck_meshes.h"
+#include "plant/transitions.h"
+
+namespace shiftrig::plant::detail {
+namespace {
+
+constexpr unsigned char closed = locked;  // and stuck
+constexpr double at_its_limit = 1e-6;     // a pair that gives way holds so much less: well above rounding
+constexpr double resting = 1e-12;         // share of the accelerations there could be: none
+
+// Torque limits of a pair: what it can hold, or, once it broke away in this instant, what it passes on sliding.
+void set_limits(const Work& w, const Sample& s, RestJoint& joint) {
+    const int k = joint.device;
+    const bool overcome = w.scratch.overcome[static_cast<std::size_t>(k)] != 0;
+    const double capacity = overcome ? s.sliding[k] : std::max(s.holding[k], s.sliding[k]);
+    const FreewheelLaw* law = freewheel_of(w, k);
+    joint.upper = law && law->sense < 0 ? law->drag : capacity;
+    joint.lower = law && law->sense > 0 ? -law->drag : -capacity;
+}
+
+// Are these contact states a solution as well, with torques as their mode shares them out? Turns loss directions on the way.
+bool is_consistent(Work& w, unsigned char* contact, Sample& s) {
+    const ModelData& m = w.model;
+    contact_forces(w, contact, s);
+    const Mode& mode = find_directions(w, contact, s);
+    const double size = torque_scale(w, s);
+    if (is_overloaded(w, most_used(w, contact, s).pair, s)) return false;
+    for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
+        if (loss_left(w, mode.rows[r] - m.pairs - m.meshes, s) < -1e-9 * size) return false;
+    }
+    sample_rate(w, mode, s);
+    for (int k = 0; k < m.first_flank; ++k) {
+        const unsigned char state = contact[k];
+        const bool open = k < m.pairs ? slips(state) : state != stuck && mesh_of(w, k - m.pairs).lossy();
+        if (!open || mode.bound[k] || !is_still(w, mode, k, s)) continue;
+        const double sign = k < m.pairs ? slip_sign(state) : motion_sign(state);
+        if (sign * device_slip(w, k, s.rate) < -1e-9 * slip_scale(w, k, s.rate)) return false;
+    }
+    return true;
+}
+
+// The search for contact states; those it tries are in scratch.trial.
+struct Search {
+    Work& w;
+    const Mode& mode;
+    Sample& s;
+    int gives_way;
+    double given;  // its torque
+    RestProblem rest;
+    bool goes = false;                       // does anything?
+    unsigned char vertex[most_joints] = {};  // the joints' states in the exact solution,
+    bool going[most_joints] = {};            // does it go?
+    bool given_way[most_joints] = {};        // taken to have broken away
+
+    unsigned char& overcome(int device) const { return w.scratch.overcome[static_cast<std::size_t>(device)]; }
+    bool has_reserve(int device) const {
+        return device < w.model.pairs && !overcome(device) && s.sliding[device] < s.holding[device];
+    }
+    void break_away(int i) {
+        given_way[i] = true;
+        overcome(rest.joints[i].device) = 1;
+    }
+    void forget() {
+        for (int i = 0; i < rest.count; ++i) {
+            if (given_way[i]) overcome(rest.joints[i].device) = 0;
+        }
+    }
+
+    bool solve(bool shared_out) {
+        for (int i = 0; i < rest.count; ++i) {
+            RestJoint& joint = rest.joints[i];
+            if (joint.mesh < 0) set_limits(w, s, joint);
+            if (joint.device != gives_way) continue;
+            const double limit = given * (1 - at_its_limit);
+            if (limit > 0) joint.upper = std::min(joint.upper, limit);
+            if (limit < 0) joint.lower = std::max(joint.lower, limit);
+        }
+        return solve_rest_problem(w.model, shared_out, rest);
+    }
+
+    bool solve_exactly() {
+        if (!solve(false)) return false;
+        goes = false;
+        for (int i = 0; i < rest.count; ++i) {
+            double share;
+            const int side = side_of(rest, i, share);
+            vertex[i] = state_of(rest, i, side);
+            going[i] = share > resting;
+            goes = goes || going[i];
+        }
+        return true;
+    }
+
+    template <typename StateOf>
+    bool attempt(const StateOf& state) {
+        unsigned char* const trial = w.scratch.trial.data();
+        std::copy(w.contact, w.contact + w.model.contact_bytes, trial);
+        for (int i = 0; i < rest.count; ++i) trial[rest.joints[i].device] = state(i);
+        return is_consistent(w, trial, s);
+    }
+    // As few changes as do, so that torques that are not unique stay nearly what they were.
+    bool attempt_least() {
+        return attempt([&](int i) {
+            const int device = rest.joints[i].device;
+            if (going[i]) return vertex[i];
+            if (goes || device != gives_way) return w.contact[device];
+            return slipping(opening_sense(w, device, given));
+        });
+    }
+    // What does not go shares out its load.
+    bool attempt_shared() {
+        return solve(true) && attempt([&](int i) {
+                   double share;
+                   return going[i] ? vertex[i] : state_of(rest, i, side_of(rest, i, share));
+               });
+    }
+
+    bool find() {
+        int giving = 0;
+        while (giving < rest.count && rest.joints[giving].device != gives_way) ++giving;
+        const bool breaks_away = giving < rest.count && has_reserve(gives_way);
+        // The one that is beyond its limit breaks away first, and passes less from then on; others may only take its
+        // load where mechanics does not say how they share it.
+        if (breaks_away && !(mode.bound[gives_way] & shares_load)) break_away(giving);
+        for (;;) {
+            if (!solve_exactly()) return false;
+            if (goes && breaks_away && !overcome(gives_way)) {
+                break_away(giving);
+                continue;
+            }
+            if (attempt_least() || attempt_shared()) return true;
+            // A pair at its limit that passes less on sliding breaks away: the others have to do with that.
+            bool breaks = false;
+            for (int i = 0; i < rest.count; ++i) {
+                if (vertex[i] == locked || !has_reserve(rest.joints[i].device)) continue;
+                break_away(i);
+                breaks = true;
+            }
+            if (!breaks) return attempt([&](int i) { return vertex[i]; });
+        }
+    }
+
+    void tell(const unsigned char* found) {
+        for (int k = 0; k < w.model.first_flank; ++k) {
+            const bool pair = k < w.model.pairs;
+            const bool was = w.contact[k] == closed, is = found[k] == closed;
+            if (was == is) continue;
+            if (pair) {
+                const double limit = was ? static_limit(w, k, s) : s.holding[k];
+                log_event(w, was ? EventKind::break_away : EventKind::lock, k, s.at.time, s.torque[k], limit,
+                          0);
+                if (was) overcome(k) = 1;
+            } else if (was) {
+                const LossAtRest loss = loss_at_rest(w, k - w.model.pairs, s);
+                log_event(w, EventKind::mesh_releases, k, s.at.time, loss.needed, loss.allowed, 0);
+            } else {
+                log_event(w, EventKind::mesh_sticks, k, s.at.time, 0, 0, 0);
+            }
+        }
+    }
+};
+
+}  // namespace
+
+Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    Search search{.w = w,
+                  .mode = find_mode(m, w.operators, w.contact, w.scratch),
+                  .s = s,
+                  .gives_way = gives_way,
+                  .given = gives_way < 0 ? 0 : s.torque[gives_way],
+                  .rest = {}};
+    if (!pose_rest_problem(w, search.mode, s, search.rest)) return Rearrangement::none;
+    const bool found = search.find();
+    contact_forces(w, w.contact, s);
+    internal_torques(w, find_mode(m, w.operators, w.contact, w.scratch), s);
+    // Meshes of one motion that share their losses in another way are no change; when they go, release_drive() says.
+    const unsigned char* const trial = w.scratch.trial.data();
+    const int relevant = search.goes ? m.contact_bytes : m.pairs;
+    if (!found || std::equal(trial, trial + relevant, w.contact)) {
+        search.forget();
+        return Rearrangement::none;
+    }
+    search.tell(trial);
+    std::copy(trial, trial + m.contact_bytes, w.contact);
+    contact_forces(w, w.contact, s);
+    return search.goes ? Rearrangement::moves : Rearrangement::stands;
+}
+
+}  // namespace shiftrig::plant::detail
