@@ -1,10 +1,10 @@
 #include "plant/contact_table.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "plant/devices.h"
+#include "plant/few.h"
 
 namespace shiftrig::plant::detail {
 
@@ -46,7 +46,7 @@ void doubt_table(Work& w) SHIFTRIG_REALTIME {
 
 void tabulate_contact(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     ContactTable& table = w.operators.table;
-    if (table.known && std::memcmp(table.contact.data(), w.contact, table.contact.size()) == 0) return;
+    if (table.known && same_bytes(table.contact.data(), w.contact, table.contact.size())) return;
     const ModelData& m = w.model;
     table.known = true;
     table.viscosity = w.operators.oil.viscosity;

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 namespace shiftrig::plant::detail {
 
@@ -23,6 +25,10 @@ inline bool same_bits(const double* a, const double* b, int count) noexcept {
     for (int i = 0; i < count; ++i)
         different |= std::bit_cast<std::uint64_t>(a[i]) ^ std::bit_cast<std::uint64_t>(b[i]);
     return different == 0;
+}
+
+inline bool same_bytes(const void* a, const void* b, std::size_t count) noexcept {
+    return count == 0 || std::memcmp(a, b, count) == 0;  // of none there may be no address
 }
 
 }  // namespace shiftrig::plant::detail

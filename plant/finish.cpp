@@ -33,7 +33,7 @@ bool is_carried(const ModelData& m, const OperatorsData& o, const double* block)
     // The step ended with the table up to date.
     return same_bits(s.z, block + at.speeds, m.states) &&
            same_bits(s.auxiliary, block + at.auxiliary, m.auxiliary) &&
-           std::memcmp(o.table.contact.data(), block + at.contact, o.table.contact.size()) == 0 &&
+           same_bytes(o.table.contact.data(), block + at.contact, o.table.contact.size()) &&
            same_bits(o.carried_engines.data(), block + at.engines, 3 * static_cast<int>(m.engines.size()));
 }
 

@@ -75,8 +75,8 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     OperatorsData& known = w.operators;
     const std::size_t bytes = known.raw_input.size() * sizeof(double);
-    if (known.inputs_known && std::memcmp(known.raw_input.data(), inputs.value.data(), bytes) == 0) return;
-    std::memcpy(known.raw_input.data(), inputs.value.data(), bytes);
+    if (known.inputs_known && same_bytes(known.raw_input.data(), inputs.value.data(), bytes)) return;
+    std::copy(inputs.value.begin(), inputs.value.end(), known.raw_input.begin());
     known.inputs_known = true;
     known.carried = false;
     for (std::size_t i = 0; i < m.inputs.size(); ++i) {

@@ -383,7 +383,8 @@ void choose_engine(ModelData& m) {
     m.tree = build_topology(m, obstacle);
     if (m.tree) return;
     if (method == Method::ark3)
-        throw ModelError("model", m.description.name, "method", "= ark3 needs a machine without loops: " + obstacle);
+        throw ModelError("model", m.description.name, "method",
+                         "= ark3 needs a machine without loops: " + obstacle);
     m.engine_reason = size + " would take ark3, but " + obstacle;
 }
 
@@ -446,6 +447,7 @@ void build_layout(ModelData& m) {
     at.sensors = take(4 * whole_panels(static_cast<int>(m.sensors.size())));
     at.tie_up = take(1);
     at.drive_sides = take(m.meshes);
+    take(loop_slack);  // read, never written, by loops over what stands before it
     at.size = next;
     for (PairLaw& law : m.pair_laws) {
         if (law.actuator >= 0) law.actuator += at.actuators;

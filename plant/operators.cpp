@@ -4,6 +4,7 @@
 #include <cstring>
 #include <utility>
 
+#include "plant/few.h"
 #include "plant/modes.h"
 
 namespace shiftrig::plant {
@@ -110,21 +111,21 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
                 ScratchData& scratch) SHIFTRIG_REALTIME {
     ++o.lookups;
     const auto contact_bytes = static_cast<std::size_t>(m.contact_bytes);
-    if (o.recent && std::memcmp(o.recent_contact.data(), contact, contact_bytes) == 0) {
+    if (o.recent && same_bytes(o.recent_contact.data(), contact, contact_bytes)) {
         o.recent->last_use = ++o.clock;
         return *o.recent;
     }
-    std::memcpy(o.recent_contact.data(), contact, contact_bytes);
+    std::copy(contact, contact + contact_bytes, o.recent_contact.begin());
     mode_key(m, contact, o.wanted.data());
     const std::size_t bytes = o.wanted.size();
-    if (o.recent && std::memcmp(o.recent->key, o.wanted.data(), bytes) == 0) {
+    if (o.recent && same_bytes(o.recent->key, o.wanted.data(), bytes)) {
         o.recent->last_use = ++o.clock;
         return *o.recent;
     }
     const std::uint64_t hash = hash_of(o.wanted.data(), bytes);
     for (std::size_t i = 0; i < o.modes.size(); ++i) {
         Mode& mode = o.modes[i];
-        if (o.hashes[i] != hash || mode.last_use == 0 || std::memcmp(mode.key, o.wanted.data(), bytes) != 0)
+        if (o.hashes[i] != hash || mode.last_use == 0 || !same_bytes(mode.key, o.wanted.data(), bytes))
             continue;
         mode.last_use = ++o.clock;
         o.recent = &mode;
@@ -136,7 +137,7 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
     }
     o.hashes[static_cast<std::size_t>(oldest - o.modes.data())] = hash;
     ++o.misses;
-    std::memcpy(oldest->key, o.wanted.data(), bytes);
+    std::copy(o.wanted.begin(), o.wanted.end(), oldest->key);
     if (m.tree) {
         build_tree_mode(m, *oldest);
         set_loss_shares(m, *oldest);
