@@ -13,7 +13,7 @@ namespace shiftrig::plant::detail {
 namespace {
 
 constexpr unsigned char closed = locked;  // and stuck
-constexpr double at_its_limit = 1e-6;     // a pair that gives way holds so much less: well above rounding
+constexpr double at_its_limit = 1e-5;     // a pair that gives way holds so much less: well above rounding
 constexpr double resting = 1e-12;         // share of the accelerations there could be: none
 
 // Torque limits of a pair: what it can hold, or, once it broke away in this instant, what it passes on sliding.
@@ -26,8 +26,9 @@ void set_limits(const Work& w, const Sample& s, RestJoint& joint) {
     joint.lower = law && law->sense > 0 ? -law->drag : -capacity;
 }
 
-// Are these contact states a solution as well, with torques as their mode shares them out? Turns loss directions on the way.
-bool is_consistent(Work& w, unsigned char* contact, Sample& s) {
+// Are these contact states a solution as well, with torques as their mode shares them out? Where nothing goes, no pair may
+// open that the others do not hold. Turns loss directions on the way.
+bool is_consistent(Work& w, unsigned char* contact, bool goes, Sample& s) {
     const ModelData& m = w.model;
     contact_forces(w, contact, s);
     const Mode& mode = find_directions(w, contact, s);
@@ -41,6 +42,7 @@ bool is_consistent(Work& w, unsigned char* contact, Sample& s) {
         const unsigned char state = contact[k];
         const bool open = k < m.pairs ? slips(state) : state != stuck && mesh_of(w, k - m.pairs).lossy();
         if (!open || mode.bound[k] || !is_still(w, mode, k, s)) continue;
+        if (!goes && k < m.pairs && w.contact[k] == locked) return false;
         const double sign = k < m.pairs ? slip_sign(state) : motion_sign(state);
         if (sign * device_slip(w, k, s.rate) < -1e-9 * slip_scale(w, k, s.rate)) return false;
     }
@@ -104,14 +106,14 @@ struct Search {
         unsigned char* const trial = w.scratch.trial.data();
         std::copy(w.contact, w.contact + w.model.contact_bytes, trial);
         for (int i = 0; i < rest.count; ++i) trial[rest.joints[i].device] = state(i);
-        return is_consistent(w, trial, s);
+        return is_consistent(w, trial, goes, s);
     }
     // As few changes as do, so that torques that are not unique stay nearly what they were.
     bool attempt_least() {
         return attempt([&](int i) {
             const int device = rest.joints[i].device;
-            if (going[i]) return vertex[i];
-            if (goes || device != gives_way) return w.contact[device];
+            if (going[i] || (goes && device == gives_way)) return vertex[i];
+            if (device != gives_way) return w.contact[device];
             return slipping(opening_sense(w, device, given));
         });
     }
