@@ -39,16 +39,16 @@ struct Mass {
 // ---- fluids, sensors ------------------------------------------------------------------------------------
 
 struct Oil {
-    double viscosity_at_zero = 0;  // [Pa s] at 0 °C
-    double viscosity_decay = 0;    // η = viscosity_at_zero·exp(−decay·T) [1/°C]
-    double initial_temperature = 90;    // [°C], input `environment.oil_temperature`
-    double drag_speed_limit = 60;  // open-clutch drag is linear up to this slip [rad/s]
-    double cold_temperature = -10;        // [°C] where the two factors below hold; ln-viscosity between
+    double viscosity_at_zero = 0;     // [Pa s] at 0 °C
+    double viscosity_decay = 0;       // η = viscosity_at_zero·exp(−decay·T) [1/°C]
+    double initial_temperature = 90;  // [°C], input `environment.oil_temperature`
+    double drag_speed_limit = 60;     // open-clutch drag is linear up to this slip [rad/s]
+    double cold_temperature = -10;    // [°C] where the two factors below hold; ln-viscosity between
     double warm_temperature = 90;
     double cold_dead_time_factor = 4;
     double cold_valve_frequency_factor = 0.4;
-    double fill_viscosity = 0.1;   // fill flow ÷ (1 + η/fill_viscosity) [Pa s]
-    double pump_flow = 0;          // shared by all clutches [m³/s]; 0: unlimited
+    double fill_viscosity = 0.1;  // fill flow ÷ (1 + η/fill_viscosity) [Pa s]
+    double pump_flow = 0;         // shared by all clutches [m³/s]; 0: unlimited
 };
 
 // A speed pick-up. Ideal sensors copy the speed.
@@ -56,8 +56,8 @@ struct SpeedSensor {
     std::string name, mass;
     bool ideal = true;
     int teeth = 0;
-    bool directional = false;     // false: unsigned
-    double drop_out_speed = 0;    // below it the sensor reads 0 [rad/s]
+    bool directional = false;   // false: unsigned
+    double drop_out_speed = 0;  // below it the sensor reads 0 [rad/s]
 };
 
 // ---- the machine -------------------------------------------------------------------------------------------
@@ -67,8 +67,8 @@ enum class Method { automatic, etd3, ark3 };
 
 // A named way to close the driveline: the gear table of `check`, the ratio definition of the scorecard.
 struct GearPath {
-    std::string name;                  // "F2"
-    std::vector<std::string> closed;   // clutches and brakes closed in it
+    std::string name;                 // "F2"
+    std::vector<std::string> closed;  // clutches and brakes closed in it
 };
 
 struct Description {
@@ -77,7 +77,7 @@ struct Description {
     std::vector<Shaft> shafts;
     std::vector<Backlash> backlashes;
     std::vector<Damper> dampers;
-    std::vector<Clutch> clutches;      // clutches, brakes, Coulomb wheel contacts
+    std::vector<Clutch> clutches;  // clutches, brakes, Coulomb wheel contacts
     std::vector<Freewheel> freewheels;
     std::vector<Gear> gears;
     std::vector<Planetary> planetaries;
@@ -95,7 +95,7 @@ struct Description {
 
     Transition transition = Transition::localised;
     Method method = Method::automatic;
-    int maximum_events = 4;               // K of numerics.md §4
+    int maximum_events = 4;  // K of numerics.md §4
     // A step is taken in up to this many parts where shafts swing or forces change too fast for one; 1: never.
     // Bounds the cost of a step. A backlash whose flanks are too stiff for that many raises both bounds (not 1).
     int maximum_parts = 16;
