@@ -6,8 +6,6 @@ namespace shiftrig::analysis {
 
 namespace {
 
-using Kind = DrivelineGraph::Kind;
-
 std::string quoted(const std::string& text) {
     std::string result = "\"";
     for (const char c : text) {
@@ -15,35 +13,6 @@ std::string quoted(const std::string& text) {
         result += c;
     }
     return result + "\"";
-}
-
-const char* shape(Kind kind) {
-    switch (kind) {
-        case Kind::mass:
-            return "box";
-        case Kind::clutch:
-        case Kind::freewheel:
-        case Kind::brake:
-        case Kind::sprag:
-            return "parallelogram";
-        case Kind::gear:
-            return "circle";
-        case Kind::planetary:
-            return "doublecircle";
-        case Kind::tyre:
-        case Kind::converter:
-            return "ellipse";
-        case Kind::shaft:
-        case Kind::backlash:
-        case Kind::damper:
-            return "plain";
-        case Kind::engine:
-        case Kind::source:
-        case Kind::road:
-        case Kind::plough:
-            return "cds";
-    }
-    return "box";
 }
 
 }  // namespace
@@ -57,7 +26,7 @@ std::string driveline_dot(const plant::Description& machine) {
         const std::string label = node.figure.empty() ? node.name : node.name + "\n" + node.figure;
         std::string escaped;
         for (const char c : quoted(label)) escaped += c == '\n' ? std::string("\\n") : std::string(1, c);
-        dot += "  n" + std::to_string(i) + " [shape=" + shape(node.kind) + ", label=" + escaped + "];\n";
+        dot += "  n" + std::to_string(i) + " [shape=" + node.symbol.shape + ", label=" + escaped + "];\n";
     }
     for (const auto& edge : graph.edges) {
         dot += "  n" + std::to_string(edge.mass) + " -- n" + std::to_string(edge.device);

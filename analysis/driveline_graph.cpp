@@ -2,68 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <deque>
 #include <map>
-
-#include "plant/connectors.h"
 
 namespace shiftrig::analysis {
 
 namespace {
-
-using Kind = DrivelineGraph::Kind;
-
-std::string digits(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, value < 1000 ? "%.4g" : "%.0f", value);
-    return text;
-}
-
-// How a connector is drawn: its symbol, and the figure that stands at it.
-struct Look {
-    Kind kind;
-    std::string figure;
-};
-Look look_of(const plant::Shaft& s) {
-    return {Kind::shaft, digits(s.stiffness) + " Nm/rad"};
-}
-Look look_of(const plant::Backlash& b) {
-    return {Kind::backlash, digits(1e3 * b.gap) + " mrad"};
-}
-Look look_of(const plant::Damper& d) {
-    return {Kind::damper, digits(d.damping) + " Nm s/rad"};
-}
-Look look_of(const plant::Clutch& c) {
-    return {c.b.empty() ? Kind::brake : c.radius > 0 ? Kind::tyre : Kind::clutch, ""};
-}
-Look look_of(const plant::Freewheel& f) {
-    return {f.b.empty() ? Kind::sprag : Kind::freewheel, digits(f.rated_torque) + " Nm"};
-}
-Look look_of(const plant::Gear& g) {
-    return {Kind::gear, "u " + digits(g.ratio)};
-}
-Look look_of(const plant::Planetary& p) {
-    return {Kind::planetary, "u " + digits(p.ratio)};
-}
-Look look_of(const plant::BrixiusTyre& t) {
-    return {Kind::tyre, "r " + digits(t.radius) + " m"};
-}
-Look look_of(const plant::TorqueConverter&) {
-    return {Kind::converter, ""};
-}
-Look look_of(const plant::Engine&) {
-    return {Kind::engine, ""};
-}
-Look look_of(const plant::TorqueSource&) {
-    return {Kind::source, ""};
-}
-Look look_of(const plant::Road&) {
-    return {Kind::road, ""};
-}
-Look look_of(const plant::Plough&) {
-    return {Kind::plough, ""};
-}
 
 class Builder {
   public:
@@ -74,11 +18,10 @@ class Builder {
             masses_[mass.name] = static_cast<int>(graph_.nodes.size());
             const bool rotating = mass.motion == plant::Motion::rotating;
             graph_.nodes.push_back(
-                {Kind::mass, mass.name, digits(mass.inertia) + (rotating ? " kg m²" : " kg")});
+                {{}, true, mass.name, digits(mass.inertia) + (rotating ? " kg m²" : " kg")});
         }
         plant::for_each_connector(machine_, [&](const auto& connector) {
-            const Look look = look_of(connector);
-            device(look.kind, connector.name, look.figure, plant::ends(connector));
+            device(look_of(connector), connector.name, plant::ends(connector));
         });
 
         place_in_columns();
@@ -90,10 +33,9 @@ class Builder {
   private:
     // A link to the housing has an empty name and is not drawn as an edge.
     template <std::size_t links>
-    void device(Kind kind, const std::string& name, const std::string& figure,
-                const std::array<plant::End, links>& ends) {
+    void device(const Look& look, const std::string& name, const std::array<plant::End, links>& ends) {
         const int node = static_cast<int>(graph_.nodes.size());
-        graph_.nodes.push_back({kind, name, figure});
+        graph_.nodes.push_back({look.symbol, false, name, look.figure});
         for (const plant::End& end : ends)
             if (const auto found = masses_.find(end.mass); found != masses_.end())
                 graph_.edges.push_back({found->second, node, end.role});
@@ -132,7 +74,7 @@ class Builder {
         for (const auto& mass : machine_.masses)
             if (!placed[static_cast<std::size_t>(masses_[mass.name])]) spread(masses_[mass.name]);
         for (const auto& placed_node : graph_.nodes)
-            if (!DrivelineGraph::hangs_on_one_mass(placed_node.kind))
+            if (!placed_node.is_on_one_mass())
                 graph_.columns = std::max(graph_.columns, placed_node.column + 1);
     }
 
@@ -140,8 +82,7 @@ class Builder {
     void order_columns() {
         std::vector<std::vector<int>> columns(static_cast<std::size_t>(graph_.columns));
         for (int i = 0; i < static_cast<int>(graph_.nodes.size()); ++i)
-            if (!DrivelineGraph::hangs_on_one_mass(node(i).kind))
-                columns[static_cast<std::size_t>(node(i).column)].push_back(i);
+            if (!node(i).is_on_one_mass()) columns[static_cast<std::size_t>(node(i).column)].push_back(i);
         const auto spread_out = [&](const std::vector<int>& column) {
             for (std::size_t k = 0; k < column.size(); ++k)
                 node(column[k]).row = static_cast<double>(k) - 0.5 * static_cast<double>(column.size() - 1);
@@ -172,7 +113,7 @@ class Builder {
     void hang() {
         for (const auto& edge : graph_.edges) {
             auto& hanging = node(edge.device);
-            if (!DrivelineGraph::hangs_on_one_mass(hanging.kind)) continue;
+            if (!hanging.is_on_one_mass()) continue;
             hanging.column = node(edge.mass).column;
             hanging.row = node(edge.mass).row;
         }

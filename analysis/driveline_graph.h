@@ -5,35 +5,20 @@
 #include <string>
 #include <vector>
 
+#include "analysis/driveline_symbols.h"
 #include "plant/description.h"
 
 namespace shiftrig::analysis {
 
 struct DrivelineGraph {
-    enum class Kind {
-        mass,
-        clutch,
-        freewheel,
-        shaft,
-        backlash,
-        damper,
-        gear,
-        planetary,
-        tyre,
-        converter,
-        brake,  // hangs on one mass
-        sprag,  // a freewheel to the housing
-        engine,
-        source,
-        road,
-        plough,  // act on one mass
-    };
     struct Node {
-        Kind kind{};
+        Symbol symbol;  // of a device
+        bool is_mass = false;
         std::string name;
         std::string figure;  // "2.6 kg m²", "41:30"
         int column = 0;
         double row = 0;  // centred: 0 is the middle line
+        bool is_on_one_mass() const { return symbol.place != Place::between; }
     };
     struct Edge {
         int mass = 0, device = 0;  // nodes
@@ -43,8 +28,6 @@ struct DrivelineGraph {
     std::vector<Edge> edges;
     int columns = 0;
     double rows = 1;  // of the fullest column
-
-    static bool hangs_on_one_mass(Kind kind) { return kind >= Kind::brake; }
 };
 
 // Also lays it out. Devices on one mass keep that mass's column and row.

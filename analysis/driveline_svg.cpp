@@ -13,8 +13,6 @@ namespace shiftrig::analysis {
 
 namespace {
 
-using Kind = DrivelineGraph::Kind;
-
 // [px] of the drawing's own coordinates.
 constexpr double column_width = 96, row_height = 92, margin = 24;
 constexpr double mass_width = 84, mass_height = 52;
@@ -65,88 +63,12 @@ std::string escaped(const std::string& text) {
     return result;
 }
 
-const char* word(Kind kind) {
-    switch (kind) {
-        case Kind::mass:
-            return "mass";
-        case Kind::clutch:
-            return "clutch";
-        case Kind::freewheel:
-        case Kind::sprag:
-            return "freewheel";
-        case Kind::shaft:
-            return "shaft";
-        case Kind::backlash:
-            return "backlash";
-        case Kind::damper:
-            return "damper";
-        case Kind::gear:
-            return "gear";
-        case Kind::planetary:
-            return "planetary";
-        case Kind::tyre:
-            return "tyre";
-        case Kind::converter:
-            return "converter";
-        case Kind::brake:
-            return "brake";
-        case Kind::engine:
-            return "engine";
-        case Kind::source:
-            return "source";
-        case Kind::road:
-            return "road";
-        case Kind::plough:
-            return "plough";
-    }
-    return "";
-}
-
-// The symbol of a device around (0, 0), its ports at ±device_width/2.
-std::string symbol(Kind kind) {
-    switch (kind) {
-        case Kind::clutch:
-            return R"(<path d="M-20 0H-4M-4 -14V14M4 -14V14M4 0H20"/>)";
-        case Kind::freewheel:
-            return R"(<path d="M-20 0H-8M-8 -9V9L8 0ZM8 -9V9M8 0H20"/>)";
-        case Kind::sprag:
-            return R"(<path d="M0 -18V-9M-9 -9H9L0 4ZM-14 4H14M-14 4l-4 6M-5 4l-4 6M4 4l-4 6M13 4l-4 6"/>)";
-        case Kind::brake:
-            return R"(<path d="M0 -18V-6M-14 -6H14M-14 2H14M-14 2l-4 6M-5 2l-4 6M4 2l-4 6M13 2l-4 6"/>)";
-        case Kind::shaft:
-            return R"(<path d="M-20 0h4l4 -8 6 16 6 -16 6 16 6 -16 4 8h4"/>)";
-        case Kind::backlash:
-            return R"(<path d="M-20 0H-11M4 -11H-11V11H4M-3 0H20M-3 -6V6"/>)";
-        case Kind::damper:
-            return R"(<path d="M-20 0H-2M-2 -7V7M-8 -10H8V10H-8M8 0H20"/>)";
-        case Kind::gear:
-            return R"(<path d="M-20 0H-13M13 0H20"/><circle cx="-4" cy="0" r="9"/><circle cx="9" cy="0" r="4"/>)";
-        case Kind::planetary:
-            return R"(<circle cx="0" cy="0" r="20"/><circle cx="0" cy="0" r="7"/><circle cx="0" cy="-13" r="5"/><circle cx="11" cy="7" r="5"/><circle cx="-11" cy="7" r="5"/>)";
-        case Kind::tyre:
-            return R"(<path d="M-20 16H20"/><circle cx="0" cy="0" r="15"/><circle cx="0" cy="0" r="6"/>)";
-        case Kind::converter:
-            return R"(<circle cx="0" cy="0" r="16"/><path d="M-20 0H-16M16 0H20M-3 -11C-12 -6 -12 6 -3 11M3 -11C12 -6 12 6 3 11"/>)";
-        case Kind::engine:
-            return R"(<path d="M0 16V8M-12 8H12V-6H-12ZM-5 -6V-12H5V-6"/>)";
-        case Kind::source:
-            return R"(<path d="M-10 4A10 10 0 1 1 10 4M10 4l-5 -4M10 4l3 -6M0 16V6"/>)";
-        case Kind::road:
-            return R"(<path d="M-16 8L16 0M-16 8H16"/>)";
-        case Kind::plough:
-            return R"(<path d="M-14 -6H8L14 8L2 2"/>)";
-        case Kind::mass:
-            break;
-    }
-    return "";
-}
-
 class Drawing {
   public:
     explicit Drawing(const plant::Description& machine)
         : machine_(machine), graph_(driveline_graph(machine)) {
         for (const auto& edge : graph_.edges)
-            if (DrivelineGraph::hangs_on_one_mass(node(edge.device).kind)) stack(edge);
+            if (node(edge.device).is_on_one_mass()) stack(edge);
         double above = 0, below = 0;
         for (int i = 0; i < static_cast<int>(graph_.nodes.size()); ++i) {
             above = std::min(above, place(i).y);
@@ -160,7 +82,7 @@ class Drawing {
     std::string draw(bool with_gear_table) {
         for (const auto& edge : graph_.edges) link(edge);
         for (int i = 0; i < static_cast<int>(graph_.nodes.size()); ++i) {
-            if (node(i).kind == Kind::mass)
+            if (node(i).is_mass)
                 mass(node(i));
             else
                 device(i);
@@ -180,16 +102,16 @@ class Drawing {
     }
 
     // Brakes and what acts on a body hang below their mass, engines and sources stand above it.
-    static bool stands(Kind kind) { return kind == Kind::engine || kind == Kind::source; }
+    static bool stands(const DrivelineGraph::Node& device) { return device.symbol.place == Place::stands; }
     void stack(const DrivelineGraph::Edge& edge) {
-        int& level = (stands(node(edge.device).kind) ? standing_ : hanging_)[edge.mass];
+        int& level = (stands(node(edge.device)) ? standing_ : hanging_)[edge.mass];
         level_[edge.device] = ++level;
     }
     Point place(int index) const {
         const auto& at = node(index);
         Point point{margin + mass_width / 2 + at.column * column_width, top_ + at.row * row_height};
         if (const auto level = level_.find(index); level != level_.end())
-            point.y += (stands(at.kind) ? -1 : 1) * (mass_height / 2 + hang_depth * (level->second - 0.55));
+            point.y += (stands(at) ? -1 : 1) * (mass_height / 2 + hang_depth * (level->second - 0.55));
         return point;
     }
 
@@ -232,16 +154,16 @@ class Drawing {
     void device(int index) {
         const auto& device = node(index);
         const Point at = place(index);
-        body_ += "<g id=\"device-" + escaped(device.name) + "\" class=\"device " + word(device.kind) +
-                 "\"><title>" + word(device.kind) + " " + escaped(device.name) +
+        body_ += "<g id=\"device-" + escaped(device.name) + "\" class=\"device " + device.symbol.word +
+                 "\"><title>" + device.symbol.word + " " + escaped(device.name) +
                  (device.figure.empty() ? "" : ", ") + escaped(device.figure) +
                  "</title><g transform=\"translate(" + px(at.x) + " " + px(at.y) + ")\">" +
-                 symbol(device.kind) + "</g>";
+                 device.symbol.drawn + "</g>";
         if (level_.contains(index)) {
             text(at.x + 34, at.y - 2, "name", device.name);
             text(at.x + 34, at.y + 10, "value", "");
         } else {
-            const double half = device.kind == Kind::planetary ? 20 : 16;
+            const double half = device.symbol.half_height;
             text(at.x, at.y - half - 5, "name", device.name);
             text(at.x, at.y + half + 10, "figure", device.figure);
             text(at.x, at.y + half + 21, "value", "");

@@ -133,7 +133,7 @@ std::vector<Gear> gears_of(const plant::Description& description) {
             const int pair = structure.pair(clutch);
             if (pair < 0) continue;
             rigid.push_back(column_of(structure.pairs[static_cast<std::size_t>(pair)].links));
-            if (structure.pairs[static_cast<std::size_t>(pair)].kind == plant::PairKind::freewheel) {
+            if (structure.pairs[static_cast<std::size_t>(pair)].kind == plant::PairKind::self_acting) {
                 seeds.push_back(rigid.back());  // locks by itself: nobody chooses a gear with it
                 continue;
             }

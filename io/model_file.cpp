@@ -6,6 +6,7 @@
 #include "io/field_reader.h"
 #include "io/field_schema.h"
 #include "io/model_fields.h"
+#include "plant/connectors.h"
 #include "plant/validation.h"
 
 namespace shiftrig::io {
@@ -32,8 +33,9 @@ class ModelReader {
         file_.places = std::move(context_.places);
         file_.can = model_.can;
         for (const auto& clutch : file_.description.clutches) clutches_.push_back(clutch.name);
-        closable_ = clutches_;
-        for (const auto& freewheel : file_.description.freewheels) closable_.push_back(freewheel.name);
+        plant::for_each_connector(file_.description, [this](const auto& connector) {
+            if (may_be_closed(connector)) closable_.push_back(connector.name);
+        });
         for (const auto& mass : file_.description.masses) masses_.push_back(mass.name);
         check_options();
         take_gear_paths();

@@ -1,4 +1,4 @@
-// Flanks of shafts with play (laws/backlash.h): when they open and close. Internal to plant/.
+// Flanks of shafts with play (connectors/backlash.h): when they open and close. Internal to plant/.
 #pragma once
 
 #include "plant/forces.h"

@@ -3,232 +3,66 @@
 #include <cmath>
 #include <limits>
 
-#include "plant/laws/engine.h"
-#include "plant/laws/hydraulics.h"
-#include "plant/laws/oil.h"
+#include "plant/connectors.h"
 #include "plant/laws/sensor.h"
-#include "plant/laws/tyre.h"
-#include "plant/model_data.h"
+#include "plant/model_builder.h"
 #include "plant/modes.h"
 
 namespace shiftrig::plant {
 namespace detail {
 namespace {
 
-int add_input(ModelData& m, const std::string& name, Unit unit, double initial, double minimum,
-              double maximum, const std::string& description) {
-    const auto [at, fresh] = m.input_index.emplace(name, static_cast<int>(m.inputs.size()));
-    if (fresh) m.inputs.push_back({name, unit, initial, minimum, maximum, description});
-    return at->second;
+// The housing as a mass of factor 0.
+template <std::size_t count>
+std::array<Link, count> branchless(std::array<Link, count> links) {
+    for (Link& link : links) {
+        if (link.mass < 0) link = {0, 0};
+    }
+    return links;
 }
 
-int add_output(ModelData& m, const std::string& name, Unit unit, const std::string& description) {
-    const int index = static_cast<int>(m.outputs.size());
-    m.output_index.emplace(name, index);
-    m.outputs.push_back({name, unit, 0, -1e300, 1e300, description});
+// Where a torque on this mass stands in f.
+int external_force(ModelData& m, int mass) {
+    int& index = m.external_force[static_cast<std::size_t>(mass)];
+    if (index >= 0) return index;
+    index = static_cast<int>(m.force_columns.size());
+    m.force_columns.push_back({Link{mass, -1}, Link{}});  // into the mass
     return index;
 }
 
-int add_switch(ModelData& m, const std::string& name, const std::string& description) {
-    return add_input(m, name, Unit::one, 0, 0, 1, description);
+}  // namespace
+
+int ModelBuilder::input(const std::string& name, Unit unit, double initial, double minimum, double maximum,
+                        const std::string& description) {
+    const auto [at, fresh] = model.input_index.emplace(name, static_cast<int>(model.inputs.size()));
+    if (fresh) model.inputs.push_back({name, unit, initial, minimum, maximum, description});
+    return at->second;
 }
 
-void add_breakpoints(ModelData& m, const Waveform& waveform) {
+int ModelBuilder::flag(const std::string& name, const std::string& description) {
+    return input(name, Unit::one, 0, 0, 1, description);
+}
+
+void ModelBuilder::output(const std::string& name, Unit unit, const std::string& description) {
+    model.output_index.emplace(name, static_cast<int>(model.outputs.size()));
+    model.outputs.push_back({name, unit, 0, -1e300, 1e300, description});
+}
+
+int ModelBuilder::external(int mass) {
+    return external_force(model, mass);
+}
+
+void ModelBuilder::breakpoints(const Waveform& waveform) {
     for (const Waveform::Piece& piece : waveform.pieces) {
-        if (piece.from > -1e299) m.breakpoints.push_back(piece.from);
-        if (piece.until < 1e299) m.breakpoints.push_back(piece.until);
+        if (piece.from > -1e299) model.breakpoints.push_back(piece.from);
+        if (piece.until < 1e299) model.breakpoints.push_back(piece.until);
     }
 }
 
-// Current that the characteristic turns into this pressure.
-double current_for(const Solenoid& solenoid, double pressure) {
-    Table inverse;
-    for (const auto& [current, value] : solenoid.pressure_over_current) {
-        if (inverse.empty() || value > inverse.back().first) inverse.push_back({value, current});
-    }
-    return interpolate(inverse, pressure);
-}
+namespace {
 
-PairLaw clutch_law(ModelData& m, const Clutch& c, int& actuator_slots) {
-    PairLaw law;
-    const std::string prefix = "clutch." + c.name + ".";
-    if (const auto* dry = std::get_if<DryFriction>(&c.friction)) {
-        law.friction = friction_law(*dry);
-        law.full_load = load_from_engagement(law.friction, 1);
-    } else {
-        const auto& wet = std::get<WetPlates>(c.friction);
-        law.friction = friction_law(wet);
-        if (c.drag) law.drag = drag_factor(wet);
-    }
-    law.actuator = actuator_slots;
-    const double h = m.options.step_size;
-    if (const auto* direct = std::get_if<ActuationDirect>(&c.actuation)) {
-        if (direct->profile.pieces.empty()) {
-            law.source = LoadSource::input;
-            law.command = add_input(m, prefix + "engagement", Unit::one, direct->initial, 0, 1e6,
-                                    "share of the nominal capacity");
-        } else {
-            law.source = LoadSource::waveform;
-            law.profile = &direct->profile;
-            add_breakpoints(m, direct->profile);
-        }
-    } else if (const auto* release = std::get_if<ActuationRelease>(&c.actuation)) {
-        law.source = LoadSource::release;
-        law.lag = lag_operator(release->lag, h);
-        law.command = add_input(m, prefix + "release_command", Unit::one, release->initial, 0, 1,
-                                "0 closed … 1 released");
-        actuator_slots += 1;
-    } else if (const auto* apply = std::get_if<ActuationApply>(&c.actuation)) {
-        law.source = LoadSource::apply;
-        law.lag = lag_operator(apply->lag, h);
-        law.command = apply->by_driver_brake
-                          ? add_input(m, "driver.brake", Unit::one, apply->initial, 0, 1, "service brake")
-                          : add_input(m, prefix + "application_command", Unit::one, apply->initial, 0, 1,
-                                      "0 open … 1 applied");
-        actuator_slots += 1;
-    } else if (const auto* hydraulic = std::get_if<ActuationHydraulic>(&c.actuation)) {
-        law.source = LoadSource::hydraulic;
-        law.hydraulic = hydraulic;
-        law.full_load = load_from_pressure(law.friction, hydraulic->maximum_pressure);
-        law.command =
-            hydraulic->solenoid
-                ? add_input(m, prefix + "current_command", Unit::ampere,
-                            current_for(*hydraulic->solenoid, hydraulic->initial), 0,
-                            hydraulic->solenoid->pressure_over_current.back().first, "solenoid current")
-                : add_input(m, prefix + "pressure_command", Unit::pascal, hydraulic->initial, 0,
-                            hydraulic->maximum_pressure, "valve pressure wanted");
-        law.valve_stuck = add_switch(m, prefix + "valve_stuck", "fault: 1 holds the valve's outlet pressure");
-        law.leak = add_switch(m, prefix + "leak", "fault: share of the chamber pressure lost");
-        law.delay_slots =
-            static_cast<int>(delay_slots(*hydraulic, m.description.oil ? &*m.description.oil : nullptr, h));
-        actuator_slots += hydraulic_slots + law.delay_slots;
-    } else {
-        law.source = LoadSource::constant;
-    }
-    law.stuck = add_input(m, prefix + "stuck", Unit::one, 0, 0, 2, "fault: 1 stuck open, 2 stuck closed");
-    if (c.heat) {
-        law.heat = &*c.heat;
-    }
-    return law;
-}
-
-void build_laws(ModelData& m) {
-    const Description& d = m.description;
-    const Structure& s = m.structure;
-    int actuator_slots = 0, heated = 0;
-    for (const FrictionPair& pair : s.pairs) {
-        PairLaw law;
-        switch (pair.kind) {
-            case PairKind::clutch:
-                law = clutch_law(m, d.clutches[static_cast<std::size_t>(pair.source)], actuator_slots);
-                break;
-            case PairKind::freewheel: {
-                const Freewheel& f = d.freewheels[static_cast<std::size_t>(pair.source)];
-                law.source = LoadSource::rated;
-                law.full_load = f.rated_torque;
-                law.freewheel = static_cast<int>(m.freewheels.size());
-                m.freewheels.push_back(freewheel_law(f, static_cast<int>(m.pair_laws.size())));
-                break;
-            }
-            case PairKind::rolling:
-                law.source = LoadSource::rolling;
-                law.full_load = rolling_moment(d.tyres[static_cast<std::size_t>(pair.source)]);
-                break;
-            case PairKind::body_resistance:
-                law.source = LoadSource::resistance;
-                break;
-            case PairKind::engine_friction:
-                law.source = LoadSource::engine;
-                break;
-        }
-        if (pair.kind != PairKind::clutch) law.friction.base = law.friction.static_factor = 1;
-        if (law.freewheel >= 0)
-            law.friction.base = d.freewheels[static_cast<std::size_t>(pair.source)].sliding_share;
-        if (law.heat) law.temperature = heated++;
-        law.sliding_at_rest = sliding_factor(law.friction, 0);
-        if (law.source == LoadSource::waveform) m.depends_on_time = true;
-        const int k = static_cast<int>(m.pair_laws.size());
-        if (law.hydraulic) m.hydraulic_pairs.push_back(k);
-        if (law.source == LoadSource::release || law.source == LoadSource::apply) m.pedal_pairs.push_back(k);
-        if (law.source == LoadSource::waveform) m.waveform_pairs.push_back(k);
-        if (law.heat) m.heated_pairs.push_back(k);
-        if (law.source < LoadSource::rolling) m.actuated_pairs = k + 1;
-        m.pair_laws.push_back(law);
-    }
-    m.layout.actuators = actuator_slots;  // sizes for now, offsets in build_layout
-    m.layout.temperatures = 2 * whole_panels(heated);
-
-    if (!d.engines.empty())
-        m.throttle = add_input(m, "driver.throttle", Unit::one, 0, 0, 1, "sets the engine's no-load speed");
-    for (const BrixiusTyre& tyre : d.tyres) {
-        TyreLaw law;
-        law.wheel = s.mass(tyre.wheel);
-        law.body = s.mass(tyre.body);
-        law.mobility = add_input(m, "environment.mobility_number", Unit::one, tyre.mobility_number, 1, 1e4,
-                                 "Brixius number of the soil");
-        law.resistance = s.pair(tyre.body + ".resistance");
-        m.tyres.push_back(law);
-    }
-    for (const TorqueConverter& c : d.converters)
-        m.converters.push_back({s.mass(c.pump), s.mass(c.turbine), -1, -1});
-    for (const Engine& e : d.engines) {
-        const std::string prefix = "engine." + e.name + ".";
-        EngineLaw law;
-        law.mass = s.mass(e.mass);
-        law.pair = s.pair(e.name + ".friction");
-        law.peak = largest_value(e.full_load);
-        law.full_load = Curve(e.full_load);
-        law.start = add_switch(m, prefix + "start", "rising edge starts a stalled engine");
-        law.speed_request_enable =
-            add_switch(m, prefix + "speed_request_enable", "1: hold the speed request");
-        law.speed_request =
-            add_input(m, prefix + "speed_request", Unit::radian_per_second, 0, 0, 1e4, "speed control");
-        law.torque_limit = add_input(m, prefix + "torque_limit", Unit::one, 1, 0, 1, "of the full-load peak");
-        law.fuel_cut = add_switch(m, prefix + "fuel_cut", "1: no fuel");
-        m.engines.push_back(law);
-    }
-    for (const TorqueSource& source : d.sources) {
-        SourceLaw law;
-        law.mass = s.mass(source.mass);
-        if (source.input)
-            law.input = add_input(m, "source." + source.name + ".torque", Unit::newton_metre, 0, -1e9, 1e9,
-                                  "test-bench torque");
-        add_breakpoints(m, source.waveform);
-        if (!source.waveform.pieces.empty()) m.depends_on_time = true;
-        m.sources.push_back(law);
-    }
-    for (const Road& road : d.roads) {
-        m.grade =
-            add_input(m, "environment.grade", Unit::one, 0, -10, 10, "slope of the road, positive uphill");
-        m.road_mass.push_back(s.mass(road.body));
-    }
-    for (const Plough& plough : d.ploughs) {
-        m.draft = add_input(m, "environment.draft", Unit::one, 0, 0, 10, "plough 0 out … 1 in the ground");
-        m.ploughs.push_back(
-            {s.mass(plough.body), s.pair(plough.body + ".resistance"), -1, plough_curve(plough)});
-    }
-    if (d.oil)
-        m.oil_temperature = add_input(m, "environment.oil_temperature", Unit::celsius,
-                                      d.oil->initial_temperature, -40, 200, "transmission oil");
-    for (const SpeedSensor& sensor : d.sensors) {
-        const std::string prefix = "sensor." + sensor.name + ".";
-        SensorLaw law;
-        law.mass = s.mass(sensor.mass);
-        law.bias = add_input(m, prefix + "bias", Unit::radian_per_second, 0, -1e6, 1e6,
-                             "fault: added to the reading");
-        law.noise =
-            add_input(m, prefix + "noise", Unit::radian_per_second, 0, 0, 1e6, "fault: standard deviation");
-        law.stuck = add_switch(m, prefix + "stuck", "fault: 1 holds the reading");
-        law.dropout = add_switch(m, prefix + "dropout", "fault: 1 reads 0");
-        law.missing_teeth = add_input(m, prefix + "missing_teeth", Unit::one, 0, 0, 1000,
-                                      "fault: teeth without an edge per turn");
-        m.sensors.push_back(law);
-    }
-    std::sort(m.breakpoints.begin(), m.breakpoints.end());
-    m.breakpoints.erase(std::unique(m.breakpoints.begin(), m.breakpoints.end()), m.breakpoints.end());
-}
-
-void build_sizes(ModelData& m) {
+// Counts, links and columns that follow from the structure alone.
+void build_columns(ModelData& m) {
     const Structure& s = m.structure;
     m.masses = s.masses();
     m.twists = static_cast<int>(s.shafts.size());
@@ -238,9 +72,9 @@ void build_sizes(ModelData& m) {
     m.states_padded = padded(m.states);
     m.torques = m.pairs + 2 * m.meshes;
     m.first_flank = m.pairs + m.meshes;
-    m.plain_shafts = static_cast<int>(m.description.shafts.size());
+    m.plain_shafts = static_cast<int>(
+        std::count_if(s.shafts.begin(), s.shafts.end(), [](const Elastic& shaft) { return shaft.gap == 0; }));
     m.contact_bytes = m.first_flank + m.twists - m.plain_shafts;
-    m.auxiliary = static_cast<int>(m.description.tyres.size() + 2 * m.description.engines.size());
     for (double inertia : s.inertia) m.root_inertia.push_back(std::sqrt(inertia));
     for (const FrictionPair& pair : s.pairs) {
         const double noteworthy = 1e-2 * pair.nominal_capacity;
@@ -256,12 +90,6 @@ void build_sizes(ModelData& m) {
             m.translating.push_back(j);
     }
 
-    const auto branchless = [](auto links) {
-        for (Link& link : links) {
-            if (link.mass < 0) link = {0, 0};
-        }
-        return links;
-    };
     for (const FrictionPair& pair : s.pairs) m.pair_slip.push_back(branchless(pair.links));
     for (const Mesh& mesh : s.meshes) m.mesh_motion.push_back(branchless(mesh.motion()));
     for (const Mesh& mesh : s.meshes) {
@@ -288,39 +116,65 @@ void build_sizes(ModelData& m) {
     }
     m.first_external = static_cast<int>(m.force_columns.size());
     m.external_force.assign(static_cast<std::size_t>(m.masses), -1);
-    const auto external = [&](int mass) {
-        int& index = m.external_force[static_cast<std::size_t>(mass)];
-        if (index >= 0) return;
-        index = static_cast<int>(m.force_columns.size());
-        m.force_columns.push_back({Link{mass, -1}, Link{}});  // into the mass
-    };
-    for (const TyreLaw& tyre : m.tyres) {
-        external(tyre.wheel);
-        external(tyre.body);
+}
+
+void build_pair_laws(ModelBuilder& builder) {
+    ModelData& m = builder.model;
+    for (const FrictionPair& pair : m.structure.pairs) {
+        PairLaw& law = m.pair_laws.emplace_back();
+        if (pair.kind != PairKind::clutch) law.friction.base = law.friction.static_factor = 1;
+        if (pair.kind == PairKind::body_resistance) law.source = LoadSource::resistance;
     }
-    for (const ConverterLaw& converter : m.converters) {
-        external(converter.pump);
-        external(converter.turbine);
+    for_each_connector(m.description, [&](const auto& connector) { add_pair_law(builder, connector); });
+    for_each_kind(all_kinds(m.description), [&m]<class Kind>(const std::vector<Kind>& devices) {
+        m.first_pair[place_of<Kind>] = devices.empty() ? -1 : m.structure.pair(devices.front().name);
+    });
+    int heated = 0;
+    for (int k = 0; k < m.pairs; ++k) {
+        PairLaw& law = builder.law(k);
+        if (law.heat) law.temperature = heated++;
+        law.sliding_at_rest = sliding_factor(law.friction, 0);
+        if (law.source == LoadSource::waveform) m.depends_on_time = true;
+        if (law.hydraulic) m.hydraulic_pairs.push_back(k);
+        if (law.source == LoadSource::release || law.source == LoadSource::apply) m.pedal_pairs.push_back(k);
+        if (law.source == LoadSource::waveform) m.waveform_pairs.push_back(k);
+        if (law.heat) m.heated_pairs.push_back(k);
+        if (law.source < LoadSource::rolling) m.actuated_pairs = k + 1;
     }
-    for (const EngineLaw& engine : m.engines) external(engine.mass);
-    for (const SourceLaw& source : m.sources) external(source.mass);
-    for (int mass : m.road_mass) external(mass);
-    for (const PloughLaw& plough : m.ploughs) external(plough.mass);
-    for (int mass : m.translating) external(mass);
-    const auto force_on = [&m](int mass) { return m.external_force[static_cast<std::size_t>(mass)]; };
-    for (TyreLaw& tyre : m.tyres) {
-        tyre.wheel_force = force_on(tyre.wheel);
-        tyre.body_force = force_on(tyre.body);
+    m.layout.actuators = builder.actuator(0);  // sizes for now, offsets in build_layout
+    m.layout.temperatures = 2 * whole_panels(heated);
+}
+
+void build_laws(ModelBuilder& builder) {
+    ModelData& m = builder.model;
+    const Description& d = m.description;
+    build_pair_laws(builder);
+    for_each_connector(d, [&](const auto& connector) { add_law(builder, connector); });
+    if (d.oil)
+        m.oil_temperature = builder.input("environment.oil_temperature", Unit::celsius,
+                                          d.oil->initial_temperature, -40, 200, "transmission oil");
+    for (const SpeedSensor& sensor : d.sensors) {
+        const std::string prefix = "sensor." + sensor.name + ".";
+        SensorLaw law;
+        law.mass = m.structure.mass(sensor.mass);
+        law.bias = builder.input(prefix + "bias", Unit::radian_per_second, 0, -1e6, 1e6,
+                                 "fault: added to the reading");
+        law.noise =
+            builder.input(prefix + "noise", Unit::radian_per_second, 0, 0, 1e6, "fault: standard deviation");
+        law.stuck = builder.flag(prefix + "stuck", "fault: 1 holds the reading");
+        law.dropout = builder.flag(prefix + "dropout", "fault: 1 reads 0");
+        law.missing_teeth = builder.input(prefix + "missing_teeth", Unit::one, 0, 0, 1000,
+                                          "fault: teeth without an edge per turn");
+        m.sensors.push_back(law);
     }
-    for (ConverterLaw& converter : m.converters) {
-        converter.pump_force = force_on(converter.pump);
-        converter.turbine_force = force_on(converter.turbine);
-    }
-    for (EngineLaw& engine : m.engines) engine.force = force_on(engine.mass);
-    for (SourceLaw& source : m.sources) source.force = force_on(source.mass);
-    for (int mass : m.road_mass) m.road_force.push_back(force_on(mass));
-    for (PloughLaw& plough : m.ploughs) plough.force = force_on(plough.mass);
-    for (int mass : m.translating) m.translating_force.push_back(force_on(mass));
+    std::sort(m.breakpoints.begin(), m.breakpoints.end());
+    m.breakpoints.erase(std::unique(m.breakpoints.begin(), m.breakpoints.end()), m.breakpoints.end());
+}
+
+// Behind the external forces those of flanks; then what the sizes and laws of all devices give.
+void build_sizes(ModelData& m) {
+    const Structure& s = m.structure;
+    for (int mass : m.translating) m.translating_force.push_back(external_force(m, mass));
     m.first_flank_force = static_cast<int>(m.force_columns.size());
     for (int e = m.plain_shafts; e < m.twists; ++e) {
         const Elastic& shaft = s.shafts[static_cast<std::size_t>(e)];
@@ -348,7 +202,6 @@ void build_sizes(ModelData& m) {
         m.power_lost.push_back(k < m.first_external ? 1 : 0);
         m.power_given.push_back(k >= m.first_external && k < m.first_flank_force ? 1 : 0);
     }
-    m.loses_in_fields = !m.tyres.empty() || !m.converters.empty();
     m.swings = static_cast<int>(m.swing_damping.size());
     for (auto* numbers : {&m.energy_factor, &m.static_factor, &m.sliding_at_rest, &m.swing_damping,
                           &m.power_lost, &m.power_given})
@@ -455,85 +308,25 @@ void build_layout(ModelData& m) {
     }
 }
 
-void build_outputs(ModelData& m) {
+// In the order in which outputs.cpp writes them.
+void build_outputs(ModelBuilder& builder) {
+    const ModelData& m = builder.model;
     const Description& d = m.description;
-    const Structure& s = m.structure;
     const auto add = [&](const std::string& name, Unit unit, const char* text) {
-        return add_output(m, name, unit, text);
+        builder.output(name, unit, text);
     };
+    const auto name_all = [&](const auto& devices) { name_outputs(builder, devices); };
     for (const Mass& mass : d.masses) {
         add("mass." + mass.name + ".speed",
             mass.motion == Motion::rotating ? Unit::radian_per_second : Unit::metre_per_second, "speed");
     }
-    for (const Shaft& shaft : d.shafts) {
-        add("shaft." + shaft.name + ".torque", Unit::newton_metre, "torque on the first link");
-        add("shaft." + shaft.name + ".twist", Unit::radian, "twist, positive where the first link is ahead");
-    }
-    // One quantity of all devices after the other: loops write them so.
-    const auto of_clutches = [&](const char* quantity, Unit unit, const char* text, const auto& has) {
-        for (std::size_t k = 0; k < d.clutches.size(); ++k) {
-            if (has(m.pair_laws[k])) add("clutch." + d.clutches[k].name + quantity, unit, text);
-        }
-    };
-    const auto every = [](const PairLaw&) { return true; };
-    of_clutches(".torque", Unit::newton_metre, "torque on the first link", every);
-    of_clutches(".slip", Unit::radian_per_second, "slip speed, first link minus second", every);
-    of_clutches(".capacity", Unit::newton_metre, "sliding capacity at the present slip", every);
-    of_clutches(".state", Unit::one, "0 locked, 1 slipping, 2 free", every);
-    of_clutches(".heat_power", Unit::watt, "friction power", every);
-    of_clutches(".heat", Unit::joule, "friction heat since start", every);
-    of_clutches(".pressure", Unit::pascal, "chamber pressure",
-                [](const PairLaw& law) { return law.hydraulic; });
-    of_clutches(".temperature", Unit::celsius, "facing surface", [](const PairLaw& law) { return law.heat; });
-    for (const Freewheel& f : d.freewheels) {
-        const std::string prefix = "freewheel." + f.name + ".";
-        add(prefix + "torque", Unit::newton_metre, "torque on the first link");
-        add(prefix + "slip", Unit::radian_per_second, "slip speed, first link minus second");
-        add(prefix + "state", Unit::one, "0 locked, 1 overloaded, 2 overrunning");
-        add(prefix + "heat_power", Unit::watt, "power of drag or overload");
-        add(prefix + "heat", Unit::joule, "heat of drag and overload since start");
-    }
-    for (const Backlash& b : d.backlashes) {
-        const std::string prefix = "backlash." + b.name + ".";
-        add(prefix + "torque", Unit::newton_metre, "torque on the first link");
-        add(prefix + "twist", Unit::radian, "twist, 0 in the middle of the play");
-        add(prefix + "state", Unit::one, "0 open, +1 or -1 the flank that is closed");
-    }
-    for (const Gear& gear : d.gears)
-        add("gear." + gear.name + ".torque", Unit::newton_metre, "torque from the first link into the gear");
-    for (const Gear& gear : d.gears)
-        add("gear." + gear.name + ".direction", Unit::one,
-            "x: +1 the first link drives, -1 it is driven, 0 at rest");
-    for (const Gear& gear : d.gears)
-        add("gear." + gear.name + ".power", Unit::watt, "power into the first link");
-    for (const Planetary& row : d.planetaries) {
-        const std::string prefix = "row." + row.name + ".";
-        add(prefix + "sun", Unit::newton_metre, "torque from the sun into the row");
-        add(prefix + "ring", Unit::newton_metre, "torque from the ring into the row");
-        add(prefix + "carrier", Unit::newton_metre, "torque from the carrier into the row");
-        add(prefix + "direction", Unit::one, "x: +1 the sun drives, -1 it is driven, 0 at rest");
-    }
-    for (const BrixiusTyre& tyre : d.tyres) {
-        add("tyre." + tyre.name + ".force", Unit::newton, "force of the wheel on the body");
-        add("tyre." + tyre.name + ".slip", Unit::one, "slip, positive when driving");
-    }
-    for (const TorqueConverter& c : d.converters) {
-        add("converter." + c.name + ".pump_torque", Unit::newton_metre, "from the pump into the converter");
-        add("converter." + c.name + ".turbine_torque", Unit::newton_metre,
-            "from the converter to the turbine");
-    }
-    for (const Engine& e : d.engines) {
-        add("engine." + e.name + ".torque", Unit::newton_metre, "net torque on the crankshaft");
-        add("engine." + e.name + ".load", Unit::one, "of full load at this speed");
-        add("engine." + e.name + ".stalled", Unit::one, "1: stalled");
-    }
+    for_each_kind(driveline_kinds(d), name_all);
     for (int j : m.translating) {
-        const std::string prefix = "body." + s.mass_names[static_cast<std::size_t>(j)] + ".";
+        const std::string prefix = "body." + m.structure.mass_names[static_cast<std::size_t>(j)] + ".";
         add(prefix + "acceleration", Unit::metre_per_second2, "acceleration");
         add(prefix + "distance", Unit::metre, "way since start");
     }
-    for (const Plough& p : d.ploughs)
-        add("plough." + p.name + ".draft", Unit::newton, "force that resists the body");
+    for_each_kind(load_kinds(d), name_all);
     for (const SpeedSensor& sensor : d.sensors)
         add("sensor." + sensor.name + ".speed", Unit::radian_per_second, "reading");
     if (d.oil) {
@@ -573,17 +366,21 @@ Model Model::build(const Description& description, const BuildOptions& options) 
     }
     m.kernel = detail::choose_kernel(options.kernel);
     m.structure = build_structure(m.description);
-    detail::build_laws(m);
+    detail::ModelBuilder builder(m);
+    detail::build_columns(m);
+    detail::build_laws(builder);
     detail::build_sizes(m);
     detail::bound_step(m);
     detail::choose_engine(m);
     detail::build_device_numbers(m);
     detail::build_layout(m);
-    detail::build_outputs(m);
+    detail::build_outputs(builder);
     for (const FrictionPair& pair : m.structure.pairs) m.device_names.push_back(pair.name);
     for (const Mesh& mesh : m.structure.meshes) m.device_names.push_back(mesh.name);
-    for (const Backlash& backlash : m.description.backlashes) m.device_names.push_back(backlash.name);
-    for (const Engine& engine : m.description.engines) m.device_names.push_back(engine.name);
+    for (const Elastic& shaft : m.structure.shafts) {
+        if (shaft.gap > 0) m.device_names.push_back(shaft.name);
+    }
+    for (const std::string& teller : builder.tellers) m.device_names.push_back(teller);
     return Model(std::move(data));
 }
 

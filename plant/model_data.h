@@ -2,14 +2,14 @@
 // step only adds and multiplies. Internal to plant/.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "plant/connectors.h"
 #include "plant/kernels.h"
-#include "plant/laws/backlash.h"
-#include "plant/laws/freewheel.h"
 #include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/lag.h"
@@ -145,6 +145,8 @@ struct ModelData {
     std::string engine_reason;                        // why so, in words
 
     std::vector<PairLaw> pair_laws;
+    std::array<int, connector_kinds> first_pair{};  // by place in the list of connectors.h: pairs of one kind stand side
+                                                    // by side, in the order of the description; −1: none
     std::vector<FreewheelLaw> freewheels;
     std::vector<BacklashLaw> backlashes;
     std::vector<int> hydraulic_pairs, pedal_pairs, waveform_pairs;  // by what actuates them

@@ -27,7 +27,7 @@ Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(const Eigen::MatrixXd& scaled
 }
 
 bool can_be_closed(const FrictionPair& pair) {
-    return pair.kind == PairKind::clutch || pair.kind == PairKind::freewheel;
+    return pair.kind == PairKind::clutch || pair.kind == PairKind::self_acting;
 }
 
 }  // namespace
@@ -53,19 +53,16 @@ RigidSet rigid_set(const Description& d, const Structure& s, const std::vector<s
         const FrictionPair& pair = s.pairs[i];
         if (!can_be_closed(pair)) continue;
         const bool named = std::find(closed.begin(), closed.end(), pair.name) != closed.end();
-        const bool contact =
-            pair.kind == PairKind::clutch && d.clutches[static_cast<std::size_t>(pair.source)].radius > 0;
-        if (named || (contact && options.rolling_tyres)) {
+        if (named || (pair.rolling_contact && options.rolling_tyres)) {
             add(pair.name, RigidSet::Kind::pair, i, {pair.links[0], pair.links[1], Link{}});
         }
     }
     for (std::size_t i = 0; options.stiff_shafts && i < s.shafts.size(); ++i) {
         add(s.shafts[i].name, RigidSet::Kind::shaft, i, {s.shafts[i].links[0], s.shafts[i].links[1], Link{}});
     }
-    for (std::size_t i = 0; options.rolling_tyres && i < d.tyres.size(); ++i) {
-        const BrixiusTyre& tyre = d.tyres[i];
-        add(tyre.name, RigidSet::Kind::tyre, i,
-            {Link{s.mass(tyre.wheel), 1}, Link{s.mass(tyre.body), -1 / tyre.radius}, Link{}});
+    for (std::size_t i = 0; options.rolling_tyres && i < s.rolling_contacts.size(); ++i) {
+        const RollingContact& tyre = s.rolling_contacts[i];
+        add(tyre.name, RigidSet::Kind::tyre, i, {tyre.links[0], tyre.links[1], Link{}});
     }
     set.columns = Eigen::MatrixXd::Zero(s.masses(), static_cast<Eigen::Index>(set.members.size()));
     for (std::size_t k = 0; k < set.members.size(); ++k) {

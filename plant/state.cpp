@@ -162,14 +162,13 @@ State::State(const Model& model) {
         wanted(j) = m.description.masses[static_cast<std::size_t>(j)].initial_speed;
     }
     std::vector<int> locked;
-    for (const Clutch& clutch : m.description.clutches) {
-        if (clutch.initially_locked) locked.push_back(m.structure.pair(clutch.name));
+    for (int k = 0; k < m.pairs; ++k) {
+        if (m.structure.pairs[static_cast<std::size_t>(k)].initially_locked) locked.push_back(k);
     }
     const Eigen::VectorXd speeds = compatible_speeds(m, wanted, locked, false, {});
     for (int j = 0; j < m.masses; ++j) block[static_cast<std::size_t>(m.layout.speeds + j)] = speeds(j);
     double* twist = block.data() + m.layout.twists;
-    for (const Shaft& shaft : m.description.shafts) *twist++ = shaft.initial_twist;
-    for (const Backlash& backlash : m.description.backlashes) *twist++ = backlash.initial_twist;
+    for (const Elastic& shaft : m.structure.shafts) *twist++ = shaft.initial_twist;
     initialise(m, block.data(), Inputs(model).value, locked);
 }
 

@@ -3,9 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
-#include "plant/laws/freewheel.h"
+#include "plant/connectors.h"
+#include "plant/format.h"
 #include "plant/plant.h"
 #include "plant/rigid_set.h"
 #include "plant/structure.h"
@@ -33,7 +33,7 @@ class Solver {
         x_.assign(structure_.meshes.size(), 0);
         solve_torques();  // ideal
         if (!problem_.ideal) settle_directions();
-        check_freewheels();
+        check_limits();
         return report();
     }
 
@@ -213,25 +213,21 @@ class Solver {
         }
     }
 
-    // What is said to be locked has to be pressed together: a freewheel does not pull. Where a tie-up leaves the split
-    // open, its sign means nothing.
-    void check_freewheels() const {
-        for (std::size_t k = 0; k < set_.members.size() && !split_not_unique_; ++k) {
-            const RigidSet::Member& member = set_.members[k];
-            if (member.kind != RigidSet::Kind::pair) continue;
-            const FrictionPair& pair = structure_.pairs[static_cast<std::size_t>(member.index)];
-            if (pair.kind != PairKind::freewheel) continue;
-            const Freewheel& f = description_.freewheels[static_cast<std::size_t>(pair.source)];
+    // What is said to be closed has to be able to pass on its torque. Where a tie-up leaves the split open, the sign of a
+    // torque means nothing.
+    void check_limits() const {
+        if (split_not_unique_) return;
+        const double tolerance = 1e-9 * torque_.cwiseAbs().maxCoeff();
+        for (std::size_t k = 0; k < set_.members.size(); ++k) {
+            if (set_.members[k].kind != RigidSet::Kind::pair) continue;
             const double torque = torque_[static_cast<Eigen::Index>(k)];
-            if (freewheel_margin(freewheel_law(f, member.index), torque) >
-                -1e-9 * torque_.cwiseAbs().maxCoeff())
-                continue;
-            char text[80];
-            std::snprintf(text, sizeof text, "\" would have to pass on %.6g Nm: it ", torque);
-            fail("closed",
-                 "= " + list(problem_.closed) + ": freewheel \"" + f.name + text +
-                     (is_next_to_overrun(freewheel_law(f, member.index), torque) ? "overruns"
-                                                                                 : "slips overloaded"));
+            for_each_connector(description_, [&](const auto& device) {
+                if (device.name != set_.members[k].name) return;
+                const char* instead = beyond_limit(device, torque, tolerance);
+                if (!instead) return;
+                fail("closed", "= " + list(problem_.closed) + ": " + kind(device) + " \"" + device.name +
+                                   format("\" would have to pass on %.6g Nm: it %s", torque, instead));
+            });
         }
     }
 

@@ -35,36 +35,37 @@ struct Link {
     double factor = 0;  // [1], or [1/m] towards a translating mass
 };
 
-// A pair that is locked, slips or is free. Besides the clutches of the description two kinds appear by
-// themselves, because what resists motion must also be able to hold a body at rest:
+// A pair that is locked, slips or is free. Besides devices that are one there are pairs that appear by themselves,
+// because what resists motion must also be able to hold a body at rest. A structure holds them in this order:
 enum class PairKind {
-    clutch,           // clutch, brake, Coulomb wheel contact: description.clutches[source]
-    freewheel,        // description.freewheels[source]
-    rolling,          // rolling moment on a tyre's wheel: description.tyres[source]
-    body_resistance,  // motion resistance and draft on a translating mass: description.masses[source]
-    engine_friction,  // of a stalled engine on its mass: description.engines[source]
+    clutch,           // closed by command: clutch, brake, Coulomb wheel contact
+    self_acting,      // a device that locks and lets go by a law of its own: freewheel
+    rolling,          // rolling moment on a tyre's wheel
+    body_resistance,  // motion resistance and draft on a translating mass
+    engine_friction,  // of a stalled engine on its mass
 };
 
 struct FrictionPair {
     std::string name;
     PairKind kind{};
-    int source = -1;
     std::array<Link, 2> links;
-    double nominal_capacity = 0;  // [Nm] or [N], > 0; shares a torque that is not unique (tie-up)
+    double nominal_capacity = 0;   // [Nm] or [N], > 0; shares a torque that is not unique (tie-up)
+    bool rolling_contact = false;  // of a wheel on a road
+    bool initially_locked = false;
 };
 
 // A gear or a planetary row: rigid, possibly with losses.
 struct Mesh {
     std::string name;
     bool planetary = false;
-    int source = -1;       // index into description.gears or .planetaries
-    int first = -1, second = -1, carrier = -1;  // masses; carrier −1: the housing
-    double ratio = 0;      // u
+    int first = -1, second = -1, carrier = -1;               // masses; carrier −1: the housing
+    double ratio = 0;                                        // u
     double forward_efficiency = 1, backward_efficiency = 1;  // first link drives / is driven
     double forward_bearing = 0, backward_bearing = 0;        // [Nm] referred to the first link
 
     bool lossy() const noexcept {
-        return forward_efficiency < 1 || backward_efficiency < 1 || forward_bearing > 0 || backward_bearing > 0;
+        return forward_efficiency < 1 || backward_efficiency < 1 || forward_bearing > 0 ||
+               backward_bearing > 0;
     }
     // û for the loss exponent x = +1, −1, or 0 (no loss: at rest, or asked for ideally).
     double force_ratio(int x) const noexcept {
@@ -75,7 +76,9 @@ struct Mesh {
         return {Link{first, 1}, Link{second, -u}, Link{carrier, carrier < 0 ? 0 : -(1 - u)}};
     }
     // What slips inside the mesh: ω_first − ω_carrier.
-    std::array<Link, 2> motion() const noexcept { return {Link{first, 1}, Link{carrier, carrier < 0 ? 0. : -1.}}; }
+    std::array<Link, 2> motion() const noexcept {
+        return {Link{first, 1}, Link{carrier, carrier < 0 ? 0. : -1.}};
+    }
 };
 
 // A shaft or a damper: a known torque stiffness·twist + damping·(ω_a − ω_b). With a gap, only beyond it.
@@ -83,8 +86,14 @@ struct Elastic {
     std::string name;
     std::array<Link, 2> links;
     double stiffness = 0, damping = 0;
-    int source = -1;  // index into description.shafts, .backlashes or .dampers
-    double gap = 0;   // the whole play [rad]; 0: none
+    double gap = 0;            // the whole play [rad]; 0: none
+    double initial_twist = 0;  // [rad], positive where the first link is ahead
+};
+
+// Where a tyre that does not slip would tie its wheel to the body.
+struct RollingContact {
+    std::string name;
+    std::array<Link, 2> links;
 };
 
 struct Structure {
@@ -94,6 +103,7 @@ struct Structure {
     std::vector<Mesh> meshes;     // gears, then planetary rows, in description order
     std::vector<Elastic> shafts;  // then backlashes
     std::vector<Elastic> dampers;
+    std::vector<RollingContact> rolling_contacts;  // of tyres whose law is a force
 
     int masses() const noexcept { return static_cast<int>(inertia.size()); }
     int mass(std::string_view name) const noexcept;  // index, or −1
@@ -102,8 +112,8 @@ struct Structure {
 
     // SDM columns as dense matrices (masses × devices), for those who need no speed.
     Eigen::MatrixXd pair_columns() const;
-    Eigen::MatrixXd mesh_columns() const;                             // A, with u
-    Eigen::MatrixXd mesh_force_columns(std::span<const int> x) const; // Â, with û by exponent x of each mesh
+    Eigen::MatrixXd mesh_columns() const;                              // A, with u
+    Eigen::MatrixXd mesh_force_columns(std::span<const int> x) const;  // Â, with û by exponent x of each mesh
     Eigen::MatrixXd shaft_columns() const;
     Eigen::MatrixXd damper_columns() const;
 };

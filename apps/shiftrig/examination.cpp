@@ -127,7 +127,7 @@ std::vector<Examination::TieUp> find_tie_ups(const plant::Description& machine,
             std::erase_if(closed, [&](const std::string& name) {
                 const int pair = structure.pair(name);
                 return pair >= 0 &&
-                       structure.pairs[static_cast<std::size_t>(pair)].kind == plant::PairKind::freewheel;
+                       structure.pairs[static_cast<std::size_t>(pair)].kind == plant::PairKind::self_acting;
             });
             closed.push_back(with);
         }

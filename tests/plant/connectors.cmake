@@ -1,7 +1,10 @@
-foreach(subject freewheel backlash)
-  add_executable(${subject}_test ${CMAKE_CURRENT_LIST_DIR}/${subject}_test.cpp)
-  target_compile_definitions(${subject}_test PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data"
+# One program per kind of connector, found by its name.
+file(GLOB CONNECTOR_TESTS CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/connectors/*_test.cpp)
+foreach(source ${CONNECTOR_TESTS})
+  get_filename_component(name ${source} NAME_WE)
+  add_executable(${name} ${source})
+  target_compile_definitions(${name} PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data"
                              SHIFTRIG_CONFIG="${CMAKE_SOURCE_DIR}/config")
-  target_link_libraries(${subject}_test PRIVATE shiftrig_plant shiftrig_model GTest::gtest_main)
-  gtest_discover_tests(${subject}_test)
+  target_link_libraries(${name} PRIVATE shiftrig_plant shiftrig_model GTest::gtest_main)
+  gtest_discover_tests(${name})
 endforeach()

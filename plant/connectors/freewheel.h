@@ -20,10 +20,27 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
 
-#include "plant/description.h"
+#include "plant/connectors/connector.h"
 
 namespace shiftrig::plant {
+
+// One-way clutch (freewheel, sprag) between a and b, with b empty to the housing. It does not let
+// ω_a − ω_b go in the sense it blocks: forward, a cannot run ahead of b; backward, a cannot fall behind.
+enum class Sense { forward, backward };
+
+struct Freewheel {
+    std::string name, a, b;
+    Sense blocks = Sense::forward;
+    double rated_torque = 0;   // held in the blocked sense [Nm], > 0
+    double sliding_share = 0;  // of it that is left while the overloaded freewheel slips, in (0, 1]
+    double drag_torque = 0;    // while overrunning [Nm], ≥ 0
+};
+
+// ---- the law
 
 struct FreewheelLaw {
     int pair = -1;     // its friction pair
@@ -50,5 +67,24 @@ inline bool is_next_to_overrun(const FreewheelLaw& law, double torque) noexcept 
 inline double freewheel_limit(const FreewheelLaw& law, double torque) noexcept {
     return law.sense * torque < 0 ? law.drag : law.rated;
 }
+
+// ---- what it answers (connector.h)
+
+inline const char* kind(const Freewheel&) {
+    return "freewheel";
+}
+inline std::array<End, 2> ends(const Freewheel& c) {
+    return {End{"a", c.a}, End{"b", c.b, true}};
+}
+inline bool may_be_closed(const Freewheel&) {
+    return true;
+}
+void check_parameters(const Check& check, const Freewheel& device);
+void assemble(Assembly& assembly, const Freewheel& device);
+void add_pair_law(detail::ModelBuilder& builder, const Freewheel& device);
+void name_outputs(detail::ModelBuilder& builder, const std::vector<Freewheel>& devices);
+double* show(const detail::Shown& at, const std::vector<Freewheel>& devices, double* next) SHIFTRIG_REALTIME;
+std::string in_words(const Freewheel& device, const Event& event);
+const char* beyond_limit(const Freewheel& device, double torque, double tolerance);
 
 }  // namespace shiftrig::plant

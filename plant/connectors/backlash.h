@@ -21,10 +21,24 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
 
-#include "plant/description.h"
+#include "plant/connectors/connector.h"
 
 namespace shiftrig::plant {
+
+// Elastic shaft with play: within the gap it passes on nothing.
+struct Backlash {
+    std::string name, a, b;
+    double stiffness = 0;      // of the closed flanks [Nm/rad], > 0
+    double damping = 0;        // of the closed flanks [Nm s/rad], ≥ 0
+    double gap = 0;            // the whole play [rad], > 0
+    double initial_twist = 0;  // [rad], positive where a is ahead of b; 0: in the middle of the play
+};
+
+// ---- the law
 
 struct BacklashLaw {
     int shaft = -1;                                   // among Structure::shafts, and so its twist
@@ -50,5 +64,19 @@ inline double flank_energy(const BacklashLaw& law, double side, double twist) no
     const double pressed = twist - side * law.half_gap;
     return side == 0 ? 0 : 0.5 * law.stiffness * pressed * pressed;
 }
+
+// ---- what it answers (connector.h)
+
+inline const char* kind(const Backlash&) {
+    return "backlash";
+}
+inline std::array<End, 2> ends(const Backlash& c) {
+    return {End{"a", c.a}, End{"b", c.b}};
+}
+void check_parameters(const Check& check, const Backlash& device);
+void assemble(Assembly& assembly, const Backlash& device);
+void name_outputs(detail::ModelBuilder& builder, const std::vector<Backlash>& devices);
+double* show(const detail::Shown& at, const std::vector<Backlash>& devices, double* next) SHIFTRIG_REALTIME;
+std::string in_words(const Backlash& device, const Event& event);
 
 }  // namespace shiftrig::plant

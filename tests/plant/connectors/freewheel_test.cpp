@@ -6,7 +6,7 @@
 #include "io/model_file.h"
 #include "plant/modal.h"
 #include "plant/statics.h"
-#include "rig.h"
+#include "tests/plant/rig.h"
 
 namespace shiftrig::plant {
 namespace {

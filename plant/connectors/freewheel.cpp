@@ -1,0 +1,84 @@
+#include "plant/connectors/freewheel.h"
+
+#include "plant/assembly.h"
+#include "plant/check.h"
+#include "plant/format.h"
+#include "plant/model_builder.h"
+#include "plant/shown.h"
+
+namespace shiftrig::plant {
+
+void check_parameters(const Check& check, const Freewheel& f) {
+    check.positive("rated_torque", f.rated_torque);
+    check.share("sliding_share", f.sliding_share);
+    check.not_negative("drag_torque", f.drag_torque);
+}
+
+void assemble(Assembly& assembly, const Freewheel& f) {
+    assembly.structure.pairs.push_back(
+        {f.name, PairKind::self_acting, assembly.between(f.a, f.b), f.rated_torque});
+}
+
+void add_pair_law(detail::ModelBuilder& builder, const Freewheel& f) {
+    const int pair = builder.pair(f.name);
+    detail::PairLaw& law = builder.law(pair);
+    law.source = detail::LoadSource::rated;
+    law.full_load = f.rated_torque;
+    law.friction.base = f.sliding_share;
+    law.freewheel = static_cast<int>(builder.model.freewheels.size());
+    builder.model.freewheels.push_back(freewheel_law(f, pair));
+}
+
+void name_outputs(detail::ModelBuilder& builder, const std::vector<Freewheel>& freewheels) {
+    for (const Freewheel& f : freewheels) {
+        const std::string prefix = "freewheel." + f.name + ".";
+        builder.output(prefix + "torque", Unit::newton_metre, "torque on the first link");
+        builder.output(prefix + "slip", Unit::radian_per_second, "slip speed, first link minus second");
+        builder.output(prefix + "state", Unit::one, "0 locked, 1 overloaded, 2 overrunning");
+        builder.output(prefix + "heat_power", Unit::watt, "power of drag or overload");
+        builder.output(prefix + "heat", Unit::joule, "heat of drag and overload since start");
+    }
+}
+
+double* show(const detail::Shown& at, const std::vector<Freewheel>&, double* next) SHIFTRIG_REALTIME {
+    for (const FreewheelLaw& law : at.model().freewheels) {
+        const unsigned char state = at.work.contact[law.pair];
+        const double torque = at.passed(law.pair), slip = at.slip(law.pair);
+        *next++ = torque;
+        *next++ = slip;
+        *next++ = state == detail::locked ? 0. : detail::slip_sign(state) * law.sense > 0 ? 1. : 2.;
+        *next++ = state == detail::locked ? 0. : torque * slip;
+        *next++ = at.heat(law.pair);
+    }
+    return next;
+}
+
+// It locks and lets go by the sense of its torque, not by pressure.
+std::string in_words(const Freewheel& f, const Event& event) {
+    const FreewheelLaw law = freewheel_law(f, -1);
+    switch (event.kind) {
+        case EventKind::break_away:
+            if (is_next_to_overrun(law, event.torque))
+                return format("overruns: torque fell to %.1f Nm, it passes on none beyond a drag of %.1f",
+                              event.torque, law.drag);
+            return format("slips overloaded: torque %.1f beyond the rated %.1f Nm", event.torque, law.rated);
+        case EventKind::lock:
+            return format("locks: slip %.3g, torque %.1f of %.1f Nm rated", event.slip, event.torque,
+                          law.rated);
+        case EventKind::engage:
+            return format(law.sense * event.slip < 0 ? "begins overrunning: slip %.3f rad/s"
+                                                     : "begins slipping: slip %.3f rad/s",
+                          event.slip);
+        default:
+            return {};
+    }
+}
+
+// It has to be pressed together: it does not pull.
+const char* beyond_limit(const Freewheel& f, double torque, double tolerance) {
+    const FreewheelLaw law = freewheel_law(f, -1);
+    if (freewheel_margin(law, torque) > -tolerance) return nullptr;
+    return is_next_to_overrun(law, torque) ? "overruns" : "slips overloaded";
+}
+
+}  // namespace shiftrig::plant

@@ -1,0 +1,44 @@
+// A Model under construction: what connectors add their laws, inputs and outputs to (connectors/connector.h). Internal to
+// plant/.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "plant/model_data.h"
+
+namespace shiftrig::plant::detail {
+
+class ModelBuilder {
+  public:
+    explicit ModelBuilder(ModelData& data) : model(data) {}
+
+    ModelData& model;  // description and structure are complete, and everything that follows from them alone
+
+    // Index of an input; several devices may share one, whose initial value and range are those of the first.
+    int input(const std::string& name, Unit unit, double initial, double minimum, double maximum,
+              const std::string& description);
+    // 0 or 1.
+    int flag(const std::string& name, const std::string& description);
+    void output(const std::string& name, Unit unit, const std::string& description);
+
+    // Index and law of the friction pair that a device put into the structure under this name. −1: there is none.
+    int pair(const std::string& name) const { return model.structure.pair(name); }
+    PairLaw& law(int pair) { return model.pair_laws[static_cast<std::size_t>(pair)]; }
+
+    // A torque or force on a mass, positive into it: index into f. Who pushes the same mass adds to the same one.
+    int external(int mass);
+
+    // Times at which something jumps, so that no step reaches across them.
+    void breakpoints(const Waveform& waveform);
+
+    // Room in the State block for an actuator.
+    int actuator(int slots) { return std::exchange(actuator_slots, actuator_slots + slots); }
+    // A device that tells events without being a pair, a mesh or a backlash.
+    void tells_events(const std::string& device) { tellers.push_back(device); }
+
+    int actuator_slots = 0;
+    std::vector<std::string> tellers;
+};
+
+}  // namespace shiftrig::plant::detail
