@@ -63,8 +63,11 @@ struct Search {
     bool given_way[most_joints] = {};        // taken to have broken away
 
     unsigned char& overcome(int device) const { return w.scratch.overcome[static_cast<std::size_t>(device)]; }
-    bool has_reserve(int device) const {
-        return device < w.model.pairs && !overcome(device) && s.sliding[device] < s.holding[device];
+    // Would the pair hold more than it passes once it slips in this sense? A freewheel that lets go holds no more than its drag.
+    bool has_reserve(int device, double sense) const {
+        if (device >= w.model.pairs || overcome(device)) return false;
+        const FreewheelLaw* law = freewheel_of(w, device);
+        return s.sliding[device] < s.holding[device] && !(law && law->sense * sense < 0);
     }
     void break_away(int i) {
         given_way[i] = true;
@@ -128,7 +131,8 @@ struct Search {
     bool find() {
         int giving = 0;
         while (giving < rest.count && rest.joints[giving].device != gives_way) ++giving;
-        const bool breaks_away = giving < rest.count && has_reserve(gives_way);
+        const bool breaks_away =
+            giving < rest.count && has_reserve(gives_way, opening_sense(w, gives_way, given));
         // The one that is beyond its limit breaks away first, and passes less from then on; others may only take its
         // load where mechanics does not say how they share it.
         if (breaks_away && !(mode.bound[gives_way] & shares_load)) break_away(giving);
@@ -142,7 +146,9 @@ struct Search {
             // A pair at its limit that passes less on sliding breaks away: the others have to do with that.
             bool breaks = false;
             for (int i = 0; i < rest.count; ++i) {
-                if (vertex[i] == locked || !has_reserve(rest.joints[i].device)) continue;
+                const RestJoint& joint = rest.joints[i];
+                if (joint.mesh >= 0 || vertex[i] == locked) continue;
+                if (!has_reserve(joint.device, slip_sign(vertex[i]))) continue;
                 break_away(i);
                 breaks = true;
             }
