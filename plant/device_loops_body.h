@@ -109,12 +109,14 @@ void subtract(const double* a, const double* b, int count, double* difference) S
     for (int i = 0; i < count; i += lanes) write(difference + i, read(a + i) - read(b + i));
 }
 
+// Read from 8 − n on, marks for the first n.
+alignas(64) constexpr std::int64_t first_marks[16] = {-1, -1, -1, -1, -1, -1, -1, -1};
+
 inline double square(const double* v, int count) noexcept {
-    alignas(64) static constexpr std::int64_t here[16] = {-1, -1, -1, -1, -1, -1, -1, -1};
     Lanes sums = {};
     for (; count > 0; count -= lanes, v += lanes) {
         Marks counted;
-        __builtin_memcpy(&counted, here + 8 - (count < lanes ? count : lanes), sizeof counted);
+        __builtin_memcpy(&counted, first_marks + 8 - (count < lanes ? count : lanes), sizeof counted);
         const Lanes value = where(counted, read(v));
         sums += value * value;
     }

@@ -145,8 +145,9 @@ struct ModelData {
     std::string engine_reason;                        // why so, in words
 
     std::vector<PairLaw> pair_laws;
-    std::array<int, connector_kinds> first_pair{};  // by place in the list of connectors.h: pairs of one kind stand side
-                                                    // by side, in the order of the description; −1: none
+    std::array<int, connector_kinds>
+        first_pair{};  // by place in the list of connectors.h: pairs of one kind stand side
+                       // by side, in the order of the description; −1: none
     std::vector<FreewheelLaw> freewheels;
     std::vector<BacklashLaw> backlashes;
     std::vector<int> hydraulic_pairs, pedal_pairs, waveform_pairs;  // by what actuates them

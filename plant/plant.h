@@ -31,7 +31,8 @@ namespace shiftrig::plant {
 // What is wrong with a description: the device, its field and the rule, so that io/ can add file and line.
 class ModelError : public std::runtime_error {
   public:
-    ModelError(std::string device_kind, std::string device_name, std::string field_name, std::string rule_text);
+    ModelError(std::string device_kind, std::string device_name, std::string field_name,
+               std::string rule_text);
     std::string kind;    // "clutch", "mass", …
     std::string device;  // "F2"
     std::string field;   // "inertia", empty if the rule is about the device as a whole
@@ -39,12 +40,21 @@ class ModelError : public std::runtime_error {
 };
 
 enum class EventKind : std::uint8_t {
-    lock, break_away, engage, release,       // friction pairs: closed, opened, free→slipping, slipping→free
-    mesh_sticks, mesh_releases, drive_side,  // gears: at rest under load, moving again, power reversed
-    tie_up, fall_back,                       // torque split not unique; more than K events in a step
-    engine_stalls, engine_starts,
-    facing_warning, facing_failure,
-    flank_closes, flank_opens,               // shafts with play
+    lock,
+    break_away,
+    engage,
+    release,  // friction pairs: closed, opened, free→slipping, slipping→free
+    mesh_sticks,
+    mesh_releases,
+    drive_side,  // gears: at rest under load, moving again, power reversed
+    tie_up,
+    fall_back,  // torque split not unique; more than K events in a step
+    engine_stalls,
+    engine_starts,
+    facing_warning,
+    facing_failure,
+    flank_closes,
+    flank_opens,  // shafts with play
 };
 
 // Why a state changed ([Algin] eq. (12), (13)); margin = capacity − |torque| at the event.
@@ -55,7 +65,7 @@ struct Event {
     double torque = 0;         // [Nm] on the first link
     // [Nm] static capacity for lock/break_away; what the loss allows for a stuck mesh; +1 or −1, which flank it is
     double capacity = 0;
-    double slip = 0;           // [rad/s]
+    double slip = 0;  // [rad/s]
 };
 
 // In words: `t=1.2034517 F2 locks: slip 0, torque 812.4 of 2569.3 Nm static`.
@@ -64,14 +74,15 @@ std::string explain(const Model& model, const Event& event);
 
 // Proof of one step, as numbers.
 struct Certificate {
-    double torque_residual = 0;      // of eq. (15), relative to the torque scale
-    double constraint_violation = 0; // worst |C_Iᵀω| [rad/s]
-    double energy_defect = 0;        // ΔE − in + dissipated over this step [J]
-    std::int32_t events = 0;         // localised in this step
-    std::int32_t fall_backs = 0;     // next-step rule used
+    double torque_residual = 0;       // of eq. (15), relative to the torque scale
+    double constraint_violation = 0;  // worst |C_Iᵀω| [rad/s]
+    double energy_defect = 0;         // ΔE − in + dissipated over this step [J]
+    std::int32_t events = 0;          // localised in this step
+    std::int32_t fall_backs = 0;      // next-step rule used
     std::int32_t mode_lookups = 0;
-    std::int32_t mode_misses = 0;    // operators built in this step
-    std::int32_t flags = 0;          // bit 0: tie-up (split not unique); bit 1: direction search gave up; bit 2: not finite
+    std::int32_t mode_misses = 0;  // operators built in this step
+    std::int32_t flags =
+        0;  // bit 0: tie-up (split not unique); bit 1: direction search gave up; bit 2: not finite
 };
 
 enum class KernelKind { automatic, portable, avx2, avx512 };
@@ -81,7 +92,11 @@ struct BuildOptions {
     KernelKind kernel = KernelKind::automatic;
 };
 
-namespace detail { struct ModelData; struct OperatorsData; struct ScratchData; }
+namespace detail {
+struct ModelData;
+struct OperatorsData;
+struct ScratchData;
+}  // namespace detail
 
 class Model {
   public:
@@ -92,15 +107,15 @@ class Model {
     ~Model();
 
     double step_size() const noexcept;
-    std::string_view kernel() const noexcept;  // "portable", "avx2", "avx512"
-    std::string_view engine() const noexcept;  // "etd3", "ark3"
+    std::string_view kernel() const noexcept;         // "portable", "avx2", "avx512"
+    std::string_view engine() const noexcept;         // "etd3", "ark3"
     std::string_view engine_reason() const noexcept;  // why this one, in words
     const Description& description() const noexcept;
 
     const std::vector<Signal>& inputs() const noexcept;
     const std::vector<Signal>& outputs() const noexcept;
-    int input(std::string_view name) const noexcept;   // index, or −1
-    int output(std::string_view name) const noexcept;  // index, or −1
+    int input(std::string_view name) const noexcept;                // index, or −1
+    int output(std::string_view name) const noexcept;               // index, or −1
     const std::vector<std::string>& device_names() const noexcept;  // as Event::device counts them
 
     std::size_t state_size() const noexcept;  // [bytes]
@@ -122,15 +137,15 @@ struct Outputs {
     explicit Outputs(const Model& model);
     std::vector<double> value;  // by model.output(name), at the end of the step
     Certificate certificate;
-    int event_count = 0;        // of this step; beyond the capacity they are only counted
+    int event_count = 0;  // of this step; beyond the capacity they are only counted
     std::array<Event, event_capacity> events;
 };
 
 class State {
   public:
-    explicit State(const Model& model);  // the description's initial state, joined onto its locked devices
-    std::int64_t steps() const noexcept; // since start
-    double time() const noexcept;        // steps·h, never accumulated
+    explicit State(const Model& model);   // the description's initial state, joined onto its locked devices
+    std::int64_t steps() const noexcept;  // since start
+    double time() const noexcept;         // steps·h, never accumulated
     std::span<const double> speeds() const noexcept;  // ω of each mass, description order [rad/s] or [m/s]
     std::span<const double> twists() const noexcept;  // of each shaft [rad]
     std::span<const std::byte> bytes() const noexcept;
