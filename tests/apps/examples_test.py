@@ -7,6 +7,7 @@ import csv
 import json
 import math
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -16,6 +17,7 @@ import unittest
 import can
 
 RIG, CPP, SOURCE = sys.argv[1:4]
+SO_RCVBUFFORCE = 33  # of Linux; Python has no name for it
 GROUP, PORT = "239.74.163.2", 43113
 BUS = "udpcan:%s:%d" % (GROUP, PORT)
 PYTHON_CONTROLLER = [sys.executable, SOURCE + "/apps/examples/python_controller.py", "udp_multicast", GROUP]
@@ -45,6 +47,12 @@ class Listener(threading.Thread):
         super().__init__(daemon=True)
         self.frames, self.ended = {}, False
         self.bus = can.Bus(interface="udp_multicast", channel=GROUP, port=PORT)
+        # In lockstep six seconds pass in one: on a busy machine Python falls behind, and what waits must have room.
+        with socket.socket(fileno=os.dup(self.bus.fileno())) as same:
+            try:
+                same.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, 8 << 20)
+            except PermissionError:
+                same.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 8 << 20)
         self.start()
 
     def run(self):
