@@ -81,14 +81,19 @@ void wt_gearbox(benchmark::State& bench, KernelKind kernel, bool shifting) {
     repeat(bench, machine, shifting ? 100 : 1000);
 }
 
-// Ploughing in F2; with `shifting`, F2 and F3 slip against each other all the time.
-void tractor(benchmark::State& bench, const std::string& file, KernelKind kernel, bool shifting) {
-    Machine machine(file, kernel);
+// So many steps of a tractor under the plough, in F2.
+void plough(Machine& machine, int steps) {
     machine.set("driver.throttle", 0.73);
     machine.set("environment.draft", 1);
     machine.set("clutch.F2.pressure_command", 18e5);
     start(machine.model, machine.state, {{"Fc", "F2"}, {{"engine", 188.6}}}, machine.inputs);
-    for (int n = 0; n < 3000; ++n) machine.step();
+    for (int n = 0; n < steps; ++n) machine.step();
+}
+
+// Ploughing in F2; with `shifting`, F2 and F3 slip against each other all the time.
+void tractor(benchmark::State& bench, const std::string& file, KernelKind kernel, bool shifting) {
+    Machine machine(file, kernel);
+    plough(machine, 3000);
     if (shifting) {
         machine.set("clutch.F2.pressure_command", 3e5);
         machine.set("clutch.F3.pressure_command", 5e5);
@@ -100,11 +105,7 @@ void tractor(benchmark::State& bench, const std::string& file, KernelKind kernel
 // What the ledger has in a step of the tractor: the last step's account, booked over and over.
 void ledger(benchmark::State& bench, KernelKind kernel) {
     Machine machine("tractor.yaml", kernel);
-    machine.set("driver.throttle", 0.73);
-    machine.set("environment.draft", 1);
-    machine.set("clutch.F2.pressure_command", 18e5);
-    start(machine.model, machine.state, {{"Fc", "F2"}, {{"engine", 188.6}}}, machine.inputs);
-    for (int n = 0; n < 1000; ++n) machine.step();
+    plough(machine, 1000);
     const detail::ModelData& m = machine.model.data();
     detail::OperatorsData& operators = machine.operators.data();
     detail::ScratchData& scratch = machine.scratch.data();
@@ -133,11 +134,7 @@ void ledger(benchmark::State& bench, KernelKind kernel) {
 // those the slowest.
 void worst_step(benchmark::State& bench, KernelKind kernel) {
     Machine machine("tractor.yaml", kernel);
-    machine.set("driver.throttle", 0.73);
-    machine.set("environment.draft", 1);
-    machine.set("clutch.F2.pressure_command", 18e5);
-    start(machine.model, machine.state, {{"Fc", "F2"}, {{"engine", 188.6}}}, machine.inputs);
-    for (int n = 0; n < 1000; ++n) machine.step();
+    plough(machine, 1000);
     const std::vector<std::byte> snapshot(machine.state.bytes().begin(), machine.state.bytes().end());
     constexpr int steps = 1500, repeats = 20;
     std::vector<double> fastest(steps, 1e300);

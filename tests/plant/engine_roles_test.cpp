@@ -2,6 +2,7 @@
 // without changing a bit; and that stepping allocates nothing.
 #include <cstdlib>
 #include <cstring>
+#include <iostream>
 #include <new>
 
 #include "io/model_file.h"
@@ -151,8 +152,8 @@ TEST(Kernels, AgreeWithThePortableOneToRounding) {
                 // Events branch on rounding, so errors may grow; engine speed is of the order of 100 rad/s.
                 EXPECT_NEAR(portable.rig.state.speeds()[j], other.rig.state.speeds()[j], 1e-7);
             }
-        } catch (const ModelError&) {
-            GTEST_SKIP() << "this processor does not run every kernel";
+        } catch (const ModelError& error) {
+            std::cout << error.what() << ": nothing to compare\n";
         }
     }
 }
