@@ -146,7 +146,6 @@ struct OperatorsData {
     // State and inputs prove to be those it was computed from.
     AlignedDoubles sample_memory;
     Sample samples[2];
-    int begin_sample = 0;
     bool carried = false;
     std::vector<double> carried_engines;  // of the State block
     double carried_energy = 0;            // stored in it [J]
@@ -156,7 +155,7 @@ struct OperatorsData {
     bool oil_known = false;
     OilEffects oil;
     std::vector<HydraulicOperator> hydraulics;  // per pair
-    std::int64_t lookups = 0, misses = 0;       // since construction
+    std::int64_t misses = 0;                    // since construction
 
   private:
     void place_matrices(const ModelData& model);

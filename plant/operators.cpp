@@ -109,7 +109,6 @@ void OperatorsData::place_trees(const ModelData& m) {
 
 Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* contact,
                 ScratchData& scratch) SHIFTRIG_REALTIME {
-    ++o.lookups;
     const auto contact_bytes = static_cast<std::size_t>(m.contact_bytes);
     if (o.recent && same_bytes(o.recent_contact.data(), contact, contact_bytes)) {
         o.recent->last_use = ++o.clock;
