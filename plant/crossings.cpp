@@ -34,11 +34,7 @@ double margin(const Work& w, int device, const Sample& s) {
     if (device >= w.model.first_flank) return flank_margin(w, backlash_of(w, device), s);
     const unsigned char state = w.contact[device];
     if (device >= w.model.pairs) return motion_sign(state) * device_slip(w, device, s.z);
-    if (state == locked) {
-        const FreewheelLaw* law = freewheel_of(w, device);
-        return law ? freewheel_margin(*law, s.torque[device])
-                   : s.holding[device] - std::fabs(s.torque[device]);
-    }
+    if (state == locked) return static_margin(w, device, s);
     return slip_sign(state) * device_slip(w, device, s.z);
 }
 
@@ -53,8 +49,8 @@ SpeedCheck speed_check(const Work& w) {
     return {w.operators.table.sense, s.begin.slip, s.half.slip, s.end.slip, w.model.law_rows};
 }
 
-// Is a locked pair under more than this share of its static capacity? On a tree any pair may be
-// locked, otherwise the first rows of the mode tell which.
+// Is a locked pair under more than this share of what it holds? On a tree any pair may be locked, otherwise the
+// first rows of the mode tell which.
 bool some_pair_strained(const Work& w, const Mode& mode, double share, const Sample& s) {
     const int count = mode.tree ? w.model.pairs : mode.first_mesh;
     bool found = false;
@@ -62,6 +58,8 @@ bool some_pair_strained(const Work& w, const Mode& mode, double share, const Sam
         const int k = mode.tree ? i : mode.rows[i];
         found |= w.contact[k] == locked && std::fabs(s.torque[k]) > share * s.holding[k];
     }
+    for (const int k : w.model.one_way_pairs)
+        found |= w.contact[k] == locked && std::fabs(s.torque[k]) > share * static_limit(w, k, s);
     return found;
 }
 
@@ -85,19 +83,13 @@ bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
     return true;
 }
 
-// What a locked freewheel would have to pass on against its sense, all_hold() does not see.
-bool freewheels_hold(const Work& w, const Sample& end) {
-    for (const FreewheelLaw& law : w.model.freewheels) {
-        if (w.contact[law.pair] == locked && freewheel_margin(law, end.torque[law.pair]) < 0) return false;
-    }
-    return true;
-}
-
-// Has a locked freewheel at an end of the part so little left that it may have had nothing within?
-bool is_near_limit(const FreewheelLaw& law, const Sample& begin, const Sample& end) {
-    const double t0 = law.sense * begin.torque[law.pair], t1 = law.sense * end.torque[law.pair];
-    if (t1 > 0.8 * law.rated) return true;
-    return law.drag + std::min(t0, t1) < 0.2 * std::max(std::fabs(t0), std::fabs(t1));
+// Has a locked pair so little left to its weak limit, at an end of the part, that it may have had nothing within? That limit
+// may be zero: little is measured by the torques.
+bool is_near_weak_limit(const Work& w, int pair, const Sample& begin, const Sample& end) {
+    const double sense = w.model.pair_laws[static_cast<std::size_t>(pair)].weak_sense;
+    const double t0 = sense * begin.torque[pair], t1 = sense * end.torque[pair];
+    return static_limit(w.model, pair, sense, end) - std::max(t0, t1) <
+           (1 - strained) * std::max(std::fabs(t0), std::fabs(t1));
 }
 
 // What holds half way, and the internal torques there: a stage knows neither. Its coordinates (on a tree, everything but
@@ -146,7 +138,7 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     double first = 1;
     if (mode.tree) return first;
     const bool by_speeds_alone =
-        m.freewheels.empty() && m.backlashes.empty() && !some_pair_strained(w, mode, strained, end);
+        m.one_way_pairs.empty() && m.backlashes.empty() && !some_pair_strained(w, mode, strained, end);
     if (by_speeds_alone && !m.kernel.loops.may_dip(speed_check(w))) return first;
     // The least of the parabola through three margins; that they are about to vanish is enough to look closer.
     const auto consider = [&](double g0, double gm, double g1) {
@@ -170,13 +162,12 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         if (slips(state)) {
             const double sign = slip_sign(state);
             consider(begun(sign * begin.slip[k]), sign * half.slip[k], sign * end.slip[k]);
-        } else if (state == locked && std::fabs(end.torque[k]) > strained * end.holding[k] &&
-                   !freewheel_of(w, k)) {
+        } else if (state == locked && std::fabs(end.torque[k]) > strained * end.holding[k]) {
             consider_torque(k);
         }
     }
-    for (const FreewheelLaw& law : m.freewheels) {
-        if (w.contact[law.pair] == locked && is_near_limit(law, begin, end)) consider_torque(law.pair);
+    for (const int k : m.one_way_pairs) {
+        if (w.contact[k] == locked && is_near_weak_limit(w, k, begin, end)) consider_torque(k);
     }
     for (const BacklashLaw& law : m.backlashes) {
         first = std::min(first, touch_between(w, law, begin, end));
@@ -196,7 +187,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
     const ModelData& m = w.model;
     w.scratch.turned = false;
     Crossing first;
-    if (all_hold(w, mode, end) && freewheels_hold(w, end) && flanks_hold(w, end)) return first;
+    if (all_hold(w, mode, end) && flanks_hold(w, end)) return first;
     bool rates_known = false, middle_known = false, begin_known = false;
     for (int k = 0; k < m.first_flank; ++k) {
         if (!violated(w, mode, k, end)) continue;
@@ -207,8 +198,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
             middle_known = true;
             const double g0 = margin(w, k, begin), gm = margin(w, k, w.scratch.half), g1 = margin(w, k, end);
             theta = g0 <= 0 ? 0 : parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
-            const FreewheelLaw* law = freewheel_of(w, k);
-            if (law && is_next_to_overrun(*law, end.torque[k])) change = Change::overrun;
+            if (is_weak(m, k, opening_sense(w, k, end.torque[k], end))) change = Change::overrun;
         } else {
             if (!rates_known) sample_rate(w, mode, begin);
             rates_known = true;

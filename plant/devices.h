@@ -54,24 +54,43 @@ inline double loss_kink(const Work& w, int mesh, double sign) {
     return sign * w.model.loss_kink[static_cast<std::size_t>(mesh)];
 }
 
+// ---- limits of a pair: −static_limit(−1) ≤ M ≤ static_limit(+1) while it is locked
+
+// Is that the sense, of torque or slip, in which it holds less than in the other?
+inline bool is_weak(const ModelData& m, int pair, double sense) noexcept {
+    return m.pair_laws[static_cast<std::size_t>(pair)].weak_sense * sense > 0;
+}
+// What it holds in this sense of its torque [Nm]; 0 asks for the stronger one.
+inline double static_limit(const ModelData& m, int pair, double sense, const Sample& s) noexcept {
+    return is_weak(m, pair, sense) ? s.load[pair] * m.pair_laws[static_cast<std::size_t>(pair)].weak_factor
+                                   : s.holding[pair];
+}
+// What it passes on once it slips in this sense [Nm].
+inline double sliding_limit(const ModelData& m, int pair, double sense, const Sample& s) noexcept {
+    return is_weak(m, pair, sense) ? s.load[pair] * m.pair_laws[static_cast<std::size_t>(pair)].weak_factor
+                                   : s.sliding[pair];
+}
+// What it holds in the sense of its torque.
+inline double static_limit(const Work& w, int pair, const Sample& s) noexcept {
+    return static_limit(w.model, pair, s.torque[pair], s);
+}
+// How far its torque is from the nearer limit [Nm]; negative: beyond it.
+inline double static_margin(const Work& w, int pair, const Sample& s) noexcept {
+    const double torque = s.torque[pair];
+    return std::min(static_limit(w.model, pair, 1, s) - torque, static_limit(w.model, pair, -1, s) + torque);
+}
+// The sense in which a locked pair would slip at this torque: the limit in that sense is the nearer one. Where both limits
+// are alike, that is the sense of the torque.
+inline double opening_sense(const Work& w, int pair, double torque, const Sample& s) noexcept {
+    const double difference = static_limit(w.model, pair, 1, s) - static_limit(w.model, pair, -1, s);
+    return 2 * torque < difference ? -1 : 1;
+}
+
 // Of a locked pair ([Algin] eq. (12)). Capacities may be as small as the rounding of torques.
 inline bool is_overloaded(const Work& w, int pair, const Sample& s) {
     if (pair < 0) return false;
     const double torque = std::fabs(s.torque[pair]);
     return torque > overload * static_limit(w, pair, s) && torque > 1e-11 * torque_scale(w, s);
-}
-
-// The law of a pair that is a freewheel, else none.
-inline const FreewheelLaw* freewheel_of(const Work& w, int pair) {
-    const int index = w.model.pair_laws[static_cast<std::size_t>(pair)].freewheel;
-    return index < 0 ? nullptr : &w.model.freewheels[static_cast<std::size_t>(index)];
-}
-
-// The sense in which a locked pair begins to slip: that of its torque. A freewheel that lets go does so at next to none.
-inline double opening_sense(const Work& w, int pair, double torque) {
-    const FreewheelLaw* law = freewheel_of(w, pair);
-    if (!law) return torque;
-    return is_next_to_overrun(*law, torque) ? -law->sense : law->sense;
 }
 
 }  // namespace shiftrig::plant::detail

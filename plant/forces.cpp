@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "plant/devices.h"
 #include "plant/few.h"
 #include "plant/laws/converter.h"
 #include "plant/laws/plough.h"
@@ -42,10 +43,11 @@ void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcep
     }
 }
 
-// Overrunning freewheels pass on their drag only; in the other sense they are pairs like any other.
-void freewheel_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
-    for (const FreewheelLaw& law : w.model.freewheels) {
-        if (slip_sign(contact[law.pair]) * law.sense < 0) s.f[law.pair] = -law.sense * law.drag;
+// Of pairs that slip in their weak sense; in the other one they are pairs like any other.
+void weak_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
+    for (const int k : w.model.one_way_pairs) {
+        const double sense = slip_sign(contact[k]);
+        if (is_weak(w.model, k, sense)) s.f[k] = sense * sliding_limit(w.model, k, sense, s);
     }
 }
 
@@ -213,7 +215,7 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHI
     std::fill(s.f, s.f + m.forces, 0.);
     law_forces(w, s);
     pair_forces(w, contact, s);
-    freewheel_forces(w, contact, s);
+    weak_forces(w, contact, s);
     flank_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }
@@ -228,11 +230,11 @@ void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     for (int i = 0; i < table.pressed_count; ++i) {
         const int k = table.pressed[static_cast<std::size_t>(i)];
         const auto at = static_cast<std::size_t>(k);
-        const double load = scratch.moves[at] ? pair_load(w, k, s.at) : s.load[k];
-        if (load == 0) continue;
-        s.f[k] = table.sense[k] * sliding_capacity(m.pair_laws[at].friction, load, s.slip[k]);
+        if (scratch.moves[at]) s.load[k] = pair_load(w, k, s.at);
+        if (s.load[k] == 0) continue;
+        s.f[k] = table.sense[k] * sliding_capacity(m.pair_laws[at].friction, s.load[k], s.slip[k]);
     }
-    freewheel_forces(w, w.contact, s);
+    weak_forces(w, w.contact, s);
     flank_forces(w, w.contact, s);
     bearing_forces(w, w.contact, s);
 }
@@ -252,7 +254,7 @@ void end_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
             sliding_capacity(m.pair_laws[static_cast<std::size_t>(k)].friction, s.load[k], s.slip[k]);
         s.f[k] = table.sense[k] * s.sliding[k];
     }
-    freewheel_forces(w, w.contact, s);
+    weak_forces(w, w.contact, s);
     flank_forces(w, w.contact, s);
     bearing_forces(w, w.contact, s);
 }
@@ -264,7 +266,7 @@ void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIF
         if (contact[k] == free_running && m.pair_laws[static_cast<std::size_t>(k)].drag > 0)
             s.f[k] = open_drag(w, k, s);
     }
-    freewheel_forces(w, contact, s);
+    weak_forces(w, contact, s);
     flank_forces(w, contact, s);
     bearing_forces(w, contact, s);
 }

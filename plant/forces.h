@@ -76,14 +76,6 @@ inline double input(const Work& work, int index) noexcept {
     return index < 0 ? 0 : work.operators.input[static_cast<std::size_t>(index)];
 }
 
-// Static limit of a locked pair on the side to which its torque points, and what is left of it [Nm].
-inline double static_limit(const Work& w, int pair, const Sample& s) noexcept {
-    const int freewheel = w.model.pair_laws[static_cast<std::size_t>(pair)].freewheel;
-    return freewheel < 0
-               ? s.holding[pair]
-               : freewheel_limit(w.model.freewheels[static_cast<std::size_t>(freewheel)], s.torque[pair]);
-}
-
 // What a pair or a mesh slips at: A_kᵀω.
 inline double slip_of(const std::array<Link, 2>& links, const double* speeds) noexcept {
     double slip = links[0].factor * speeds[links[0].mass];

@@ -49,7 +49,9 @@ struct PairLaw {
     int delay_slots = 0;                                        // of a hydraulic actuator
     int command = -1, stuck = -1, valve_stuck = -1, leak = -1;  // inputs
     int temperature = -1;                                       // of the surface, offset in the State block
-    int freewheel = -1;                                         // index into ModelData::freewheels
+    // The sense of torque and slip in which the pair holds less than in the other, ±1, and what it holds and passes on
+    // there, of its load [1]. 0: both senses are alike.
+    double weak_sense = 0, weak_factor = 0;
     const FacingHeat* heat = nullptr;
 };
 
@@ -146,9 +148,9 @@ struct ModelData {
 
     std::vector<PairLaw> pair_laws;
     std::array<int, connector_kinds>
-        first_pair{};  // by place in the list of connectors.h: pairs of one kind stand side
-                       // by side, in the order of the description; −1: none
-    std::vector<FreewheelLaw> freewheels;
+        first_pair{};                // by place in the list of connectors.h: pairs of one kind stand side
+                                     // by side, in the order of the description; −1: none
+    std::vector<int> one_way_pairs;  // those with a weak sense
     std::vector<BacklashLaw> backlashes;
     std::vector<int> hydraulic_pairs, pedal_pairs, waveform_pairs;  // by what actuates them
     std::vector<int> heated_pairs;

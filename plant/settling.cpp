@@ -119,7 +119,7 @@ void open_pair(Work& w, const Mode& mode, int pair, Sample& s) SHIFTRIG_REALTIME
         if (mode.bound[k] && mesh_of(w, k - w.model.pairs).lossy()) w.contact[k] = stuck;
     }
     log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], static_limit(w, pair, s), 0);
-    w.contact[pair] = slipping(opening_sense(w, pair, s.torque[pair]));
+    w.contact[pair] = slipping(opening_sense(w, pair, s.torque[pair], s));
     w.scratch.overcome[static_cast<std::size_t>(pair)] = !mode.tree;
     contact_forces(w, w.contact, s);
 }

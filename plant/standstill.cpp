@@ -20,10 +20,12 @@ constexpr double resting = 1e-12;         // share of the accelerations there co
 void set_limits(const Work& w, const Sample& s, RestJoint& joint) {
     const int k = joint.device;
     const bool overcome = w.scratch.overcome[static_cast<std::size_t>(k)] != 0;
-    const double capacity = overcome ? s.sliding[k] : std::max(s.holding[k], s.sliding[k]);
-    const FreewheelLaw* law = freewheel_of(w, k);
-    joint.upper = law && law->sense < 0 ? law->drag : capacity;
-    joint.lower = law && law->sense > 0 ? -law->drag : -capacity;
+    const auto limit = [&](double sense) {
+        const double sliding = sliding_limit(w.model, k, sense, s);
+        return overcome ? sliding : std::max(static_limit(w.model, k, sense, s), sliding);
+    };
+    joint.upper = limit(1);
+    joint.lower = -limit(-1);
 }
 
 // Are these contact states a solution as well, with torques as their mode shares them out? Where nothing goes, no pair may
@@ -63,11 +65,10 @@ struct Search {
     bool given_way[most_joints] = {};        // taken to have broken away
 
     unsigned char& overcome(int device) const { return w.scratch.overcome[static_cast<std::size_t>(device)]; }
-    // Would the pair hold more than it passes once it slips in this sense? A freewheel that lets go holds no more than its drag.
+    // Would the pair hold more than it passes once it slips in this sense?
     bool has_reserve(int device, double sense) const {
         if (device >= w.model.pairs || overcome(device)) return false;
-        const FreewheelLaw* law = freewheel_of(w, device);
-        return s.sliding[device] < s.holding[device] && !(law && law->sense * sense < 0);
+        return sliding_limit(w.model, device, sense, s) < static_limit(w.model, device, sense, s);
     }
     void break_away(int i) {
         given_way[i] = true;
@@ -117,7 +118,7 @@ struct Search {
             const int device = rest.joints[i].device;
             if (going[i] || (goes && device == gives_way)) return vertex[i];
             if (device != gives_way) return w.contact[device];
-            return slipping(opening_sense(w, device, given));
+            return slipping(opening_sense(w, device, given, s));
         });
     }
     // What does not go shares out its load.
@@ -132,7 +133,7 @@ struct Search {
         int giving = 0;
         while (giving < rest.count && rest.joints[giving].device != gives_way) ++giving;
         const bool breaks_away =
-            giving < rest.count && has_reserve(gives_way, opening_sense(w, gives_way, given));
+            giving < rest.count && has_reserve(gives_way, opening_sense(w, gives_way, given, s));
         // The one that is beyond its limit breaks away first, and passes less from then on; others may only take its
         // load where mechanics does not say how they share it.
         if (breaks_away && !(mode.bound[gives_way] & shares_load)) break_away(giving);

@@ -72,7 +72,7 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
                 double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 4;
     // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
-    // beyond. So too with a freewheel that lets go at no torque: this side of it, it would only lock again.
+    // beyond. So too with a pair that lets go at next to no torque: this side of it, it would only lock again.
     const bool by_itself = acts_by_itself(crossing.change), overrun = crossing.change == Change::overrun;
     const double close_enough = by_itself ? 1e-2 : overrun ? 1e-3 : 1e-5;
     const double beyond = by_itself ? 3e-3 : overrun ? 3e-4 : 0;

@@ -15,7 +15,7 @@ enum class Change {
     state,    // a pair opens or closes, a mesh comes to rest
     turn,     // the power through a mesh turns round
     release,  // a stuck mesh goes
-    overrun,  // a freewheel lets go
+    overrun,  // a pair lets go in its weak sense
     limit,    // a stuck mesh stays, but has to leave to others what is too much for its loss
     flank,    // a flank closes or opens
 };

@@ -25,8 +25,9 @@ void add_pair_law(detail::ModelBuilder& builder, const Freewheel& f) {
     law.source = detail::LoadSource::rated;
     law.full_load = f.rated_torque;
     law.friction.base = f.sliding_share;
-    law.freewheel = static_cast<int>(builder.model.freewheels.size());
-    builder.model.freewheels.push_back(freewheel_law(f, pair));
+    law.weak_sense = -blocked_sense(f);
+    law.weak_factor = f.drag_torque / f.rated_torque;
+    builder.model.one_way_pairs.push_back(pair);
 }
 
 void name_outputs(detail::ModelBuilder& builder, const std::vector<Freewheel>& freewheels) {
@@ -40,34 +41,37 @@ void name_outputs(detail::ModelBuilder& builder, const std::vector<Freewheel>& f
     }
 }
 
-double* show(const detail::Shown& at, const std::vector<Freewheel>&, double* next) SHIFTRIG_REALTIME {
-    for (const FreewheelLaw& law : at.model().freewheels) {
-        const unsigned char state = at.work.contact[law.pair];
-        const double torque = at.passed(law.pair), slip = at.slip(law.pair);
+double* show(const detail::Shown& at, const std::vector<Freewheel>& freewheels,
+             double* next) SHIFTRIG_REALTIME {
+    int pair = at.first_pair(freewheels);
+    for (const Freewheel& f : freewheels) {
+        const unsigned char state = at.work.contact[pair];
+        const double torque = at.passed(pair), slip = at.slip(pair);
         *next++ = torque;
         *next++ = slip;
-        *next++ = state == detail::locked ? 0. : detail::slip_sign(state) * law.sense > 0 ? 1. : 2.;
+        *next++ = state == detail::locked ? 0. : detail::slip_sign(state) * blocked_sense(f) > 0 ? 1. : 2.;
         *next++ = state == detail::locked ? 0. : torque * slip;
-        *next++ = at.heat(law.pair);
+        *next++ = at.heat(pair);
+        ++pair;
     }
     return next;
 }
 
 // It locks and lets go by the sense of its torque, not by pressure.
 std::string in_words(const Freewheel& f, const Event& event) {
-    const FreewheelLaw law = freewheel_law(f, -1);
     switch (event.kind) {
         case EventKind::break_away:
-            if (is_next_to_overrun(law, event.torque))
+            if (is_next_to_overrun(f, event.torque))
                 return format("overruns: torque fell to %.1f Nm, it passes on none beyond a drag of %.1f",
-                              event.torque, law.drag);
-            return format("slips overloaded: torque %.1f beyond the rated %.1f Nm", event.torque, law.rated);
+                              event.torque, f.drag_torque);
+            return format("slips overloaded: torque %.1f beyond the rated %.1f Nm", event.torque,
+                          f.rated_torque);
         case EventKind::lock:
             return format("locks: slip %.3g, torque %.1f of %.1f Nm rated", event.slip, event.torque,
-                          law.rated);
+                          f.rated_torque);
         case EventKind::engage:
-            return format(law.sense * event.slip < 0 ? "begins overrunning: slip %.3f rad/s"
-                                                     : "begins slipping: slip %.3f rad/s",
+            return format(blocked_sense(f) * event.slip < 0 ? "begins overrunning: slip %.3f rad/s"
+                                                            : "begins slipping: slip %.3f rad/s",
                           event.slip);
         default:
             return {};
@@ -76,9 +80,8 @@ std::string in_words(const Freewheel& f, const Event& event) {
 
 // It has to be pressed together: it does not pull.
 const char* beyond_limit(const Freewheel& f, double torque, double tolerance) {
-    const FreewheelLaw law = freewheel_law(f, -1);
-    if (freewheel_margin(law, torque) > -tolerance) return nullptr;
-    return is_next_to_overrun(law, torque) ? "overruns" : "slips overloaded";
+    if (freewheel_margin(f, torque) > -tolerance) return nullptr;
+    return is_next_to_overrun(f, torque) ? "overruns" : "slips overloaded";
 }
 
 }  // namespace shiftrig::plant

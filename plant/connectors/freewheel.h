@@ -42,30 +42,20 @@ struct Freewheel {
 
 // ---- the law
 
-struct FreewheelLaw {
-    int pair = -1;     // its friction pair
-    double sense = 1;  // s
-    double rated = 0;  // M_R [Nm]
-    double drag = 0;   // M_D [Nm]
-};
-
-inline FreewheelLaw freewheel_law(const Freewheel& f, int pair) noexcept {
-    return {pair, f.blocks == Sense::forward ? 1. : -1., f.rated_torque, f.drag_torque};
+inline double blocked_sense(const Freewheel& f) noexcept {  // s
+    return f.blocks == Sense::forward ? 1 : -1;
 }
 
 // What is left until a locked freewheel at torque M changes its state [Nm]; negative: beyond it.
-inline double freewheel_margin(const FreewheelLaw& law, double torque) noexcept {
-    return std::min(law.rated - law.sense * torque, law.drag + law.sense * torque);
+inline double freewheel_margin(const Freewheel& f, double torque) noexcept {
+    const double blocked = blocked_sense(f) * torque;
+    return std::min(f.rated_torque - blocked, f.drag_torque + blocked);
 }
 
 // Is the limit next to torque M the one at which it begins to overrun?
-inline bool is_next_to_overrun(const FreewheelLaw& law, double torque) noexcept {
-    return law.drag + law.sense * torque < law.rated - law.sense * torque;
-}
-
-// Static limit on the side to which M points [Nm].
-inline double freewheel_limit(const FreewheelLaw& law, double torque) noexcept {
-    return law.sense * torque < 0 ? law.drag : law.rated;
+inline bool is_next_to_overrun(const Freewheel& f, double torque) noexcept {
+    const double blocked = blocked_sense(f) * torque;
+    return f.drag_torque + blocked < f.rated_torque - blocked;
 }
 
 // ---- what it answers (connector.h)
