@@ -97,7 +97,8 @@ struct Description {
     Method method = Method::automatic;
     int maximum_events = 4;  // K of numerics.md §4
     // A step is taken in up to this many parts where shafts swing or forces change too fast for one; 1: never.
-    // Bounds the cost of a step. A backlash whose flanks are too stiff for that many raises both bounds (not 1).
+    // Bounds the cost of a step. A backlash whose flanks are too stiff for that many raises both bounds, friction that rises
+    // too steeply over the slip the second, to 256 at most (not 1).
     int maximum_parts = 16;
 };
 

@@ -21,7 +21,13 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     if (whole) {
         s.used = mode.step;
     } else {
-        s.used = build_step_operators(m, mode, h, s.operator_memory.data()->value, s.workspace.data());
+        // Parts of one length share their operators.
+        if (s.part_mode != &mode || s.part_modes_built != w.operators.misses || s.part.length != h) {
+            s.part = build_step_operators(m, mode, h, s.operator_memory.data()->value, s.workspace.data());
+            s.part_mode = &mode;
+            s.part_modes_built = w.operators.misses;
+        }
+        s.used = s.part;
     }
     const StepOperators& op = s.used;
     const Kernel& kernel = m.kernel;

@@ -44,6 +44,7 @@ void reset(Outputs& outputs, ScratchData& scratch, int forces) {
     clear_few(scratch.work, scratch.work + forces);
     scratch.dissipated = scratch.input_work = 0;
     scratch.begin_groups = nullptr;
+    scratch.part_mode = nullptr;
 }
 
 void advance_temperatures(Work& w) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "plant/laws/friction.h"
 #include "plant/laws/tyre.h"
 #include "plant/structure.h"
 
@@ -179,6 +180,29 @@ void warn_of_resonances(const Description& d, const GearVariant& gear, std::vect
     }
 }
 
+// Friction that rises over the slip damps light masses; a step is divided into 256 parts at most for it.
+void warn_of_steep_friction(const Description& d, std::vector<std::string>& warnings) {
+    constexpr double shortest = 4e-6;  // 1/256 of a step of 1 ms [s]
+    const auto mobility = [&d](const std::string& name) {
+        for (const Mass& mass : d.masses) {
+            if (mass.name == name) return 1 / mass.inertia;
+        }
+        return 0.;  // the housing
+    };
+    for (const Clutch& clutch : d.clutches) {
+        const auto* dry = std::get_if<DryFriction>(&clutch.friction);
+        if (!dry) continue;
+        const FrictionLaw law = friction_law(*dry);
+        const double slope = load_from_engagement(law, 1) * steepest_rise(law);
+        const double radius = clutch.radius > 0 ? clutch.radius : 1;
+        const double time = 1 / (slope * (mobility(clutch.a) + mobility(clutch.b) / (radius * radius)));
+        if (time >= shortest) continue;
+        warnings.push_back("clutch \"" + clutch.name + "\": its friction rises by " + number(slope) +
+                           " Nm s/rad and so slows its lighter mass within " + number(1e6 * time) +
+                           " µs; a step of 1 ms resolves no less than 4 µs");
+    }
+}
+
 }  // namespace
 
 double GearVariant::kmh(double input_rpm) const noexcept {
@@ -279,6 +303,7 @@ std::vector<std::string> model_warnings(const Description& d) {
                                " is beyond 1e7: joins and internal torques lose digits");
         }
     }
+    warn_of_steep_friction(d, warnings);
     for (const GearVariant& gear : gear_variants(d)) {
         for (const TieUp& tie : gear.tie_ups) {
             std::string names;

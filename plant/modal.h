@@ -72,7 +72,7 @@ ModalResult natural_modes(const Description& description, const std::vector<std:
 // ---- warnings ---------------------------------------------------------------------------------------
 
 // What a careful engineer would like to hear about his model, one sentence each: efficiencies below 0.5 (loss directions
-// need not be unique), inertia ratios beyond 1e7, modes that the engine's third order meets between idle and high idle.
+// need not be unique), inertia ratios beyond 1e7, friction too steep for a step of 1 ms, modes that the engine's third order meets between idle and high idle.
 std::vector<std::string> model_warnings(const Description& description);
 
 }  // namespace shiftrig::plant

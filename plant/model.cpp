@@ -208,19 +208,40 @@ void build_sizes(ModelData& m) {
         numbers->resize(numbers->size() + loop_slack, 0.);
 }
 
+// How fast two links could be moved against each other if they were free: acceleration per torque.
+double mobility_between(const ModelData& m, const std::array<Link, 2>& links) {
+    double mobility = 0;
+    for (const Link& link : links) {
+        if (link.mass >= 0)
+            mobility += link.factor * link.factor / m.structure.inertia[static_cast<std::size_t>(link.mass)];
+    }
+    return mobility;
+}
+
+// As many parts of a step as `reach` time constants or radians of turn ask for.
+void divide_step(ModelData& m, double reach, int most) {
+    while (m.maximum_parts > 1 && m.maximum_parts < reach && m.maximum_parts < most) m.maximum_parts *= 2;
+}
+
 // A contact of flanks can be as short as half a period of the lightest motion they allow. The parts of a step have to
-// see it, and its events have to have room.
+// see it, and its events have to have room. Friction that rises with speed is a damper that the step does not take
+// exactly: its parts must not be longer than its time constant.
 void bound_step(ModelData& m) {
+    constexpr int most_for_flanks = 1 << 14, most_for_friction = 256;
     m.maximum_events = m.description.maximum_events;
     m.maximum_parts = m.description.maximum_parts;
+    for (int k = 0; k < m.pairs; ++k) {
+        const PairLaw& law = m.pair_laws[static_cast<std::size_t>(k)];
+        const double rate = law.full_load * steepest_rise(law.friction) *
+                            mobility_between(m, m.structure.pairs[static_cast<std::size_t>(k)].links);
+        divide_step(m, rate * m.options.step_size, most_for_friction);
+    }
     for (const BacklashLaw& law : m.backlashes) {
-        double mobility = 0;
-        for (const Link& link : m.structure.shafts[static_cast<std::size_t>(law.shaft)].links)
-            mobility += link.factor * link.factor / m.structure.inertia[static_cast<std::size_t>(link.mass)];
+        const double mobility =
+            mobility_between(m, m.structure.shafts[static_cast<std::size_t>(law.shaft)].links);
         const double turn = std::sqrt(law.stiffness * mobility) * m.options.step_size;  // ωh
         m.maximum_events += 2 * static_cast<int>(std::ceil(std::min(turn, 1e4) / 3)) + 2;
-        while (m.maximum_parts > 1 && m.maximum_parts < turn && m.maximum_parts < 1 << 14)
-            m.maximum_parts *= 2;
+        divide_step(m, turn, most_for_flanks);
     }
 }
 

@@ -103,6 +103,9 @@ struct ScratchData {
     bool turned = false;                            // power turned round in some mesh within the last part
     double torque_residual = 0;                     // of the tree's internal torques at `end`
     StepOperators used;                             // by the last advance
+    StepOperators part;                             // in operator_memory, for a part of a step
+    const Mode* part_mode = nullptr;                // of this mode, as it was when so many had been built
+    std::int64_t part_modes_built = 0;
     bool carries = false;  // `begin` is as the last advance left it, untouched by a change of state
 };
 

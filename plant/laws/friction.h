@@ -94,6 +94,21 @@ inline double sliding_factor(const FrictionLaw& law, double slip) noexcept {
     return law.base + law.rise * exp(-std::fabs(slip) * law.inverse_speed);
 }
 
+// The steepest rise of that factor over the slip [s/rad]: friction that grows with speed damps, and takes small steps.
+inline double steepest_rise(const FrictionLaw& law) noexcept {
+    double steepest = -law.rise * law.inverse_speed;
+    if (law.factor_over_slip != nullptr) {
+        const Table& table = *law.factor_over_slip;
+        for (std::size_t i = 1; i < table.size(); ++i) {
+            const double slope =
+                (table[i].second - table[i - 1].second) / (table[i].first - table[i - 1].first);
+            steepest = i == 1 ? slope : std::fmax(steepest, slope);
+        }
+        if (table.size() < 2) steepest = 0;
+    }
+    return std::fmax(steepest, 0);
+}
+
 inline double sliding_capacity(const FrictionLaw& law, double load, double slip) noexcept {
     return load * sliding_factor(law, slip);
 }

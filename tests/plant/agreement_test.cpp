@@ -235,6 +235,20 @@ TEST(RandomSystems, PowerTurnsWhereAClutchBeginsToPress) {
     EXPECT_LT(c.worst, 0.01);
 }
 
+// Friction that rises over the slip damps, and light bodies are damped faster than a part of a step is long (25, 69).
+TEST(RandomSystems, WithFrictionTablesAgreeWithTheReferenceSolver) {
+    const ComparisonOptions options;
+    for (const std::uint64_t seed :
+         {1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u, 9u, 10u, 25u, 69u, 74u, 88u, 170u, 194u, 241u}) {
+        const Comparison c =
+            compare(random_system_with_friction_tables(seed, options.seconds), seed, options);
+        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
+        EXPECT_EQ(name(c.outcome), std::string("agrees"))
+            << "seed " << seed << ": " << c.worst << " tolerances on " << c.worst_signal;
+        EXPECT_EQ(c.fall_backs, 0) << "seed " << seed;
+    }
+}
+
 TEST(RandomSystems, WithBacklashesAgreeWithTheReferenceSolver) {
     const ComparisonOptions options;
     int agreeing = 0, compared = 0, backlashes = 0;

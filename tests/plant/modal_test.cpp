@@ -257,6 +257,20 @@ TEST(Warnings, NameEfficiencyInertiaAndTieUp) {
               "gear double: the loop of C1, C1b is closed twice: the split of torque is not unique");
 }
 
+// 20 Nm more per 0.1 rad/s on 1e-4 kg m²: gone within 0.5 µs.
+TEST(Warnings, NameFrictionThatIsTooSteep) {
+    Description d;
+    d.masses = {machines::mass("light", 1e-4), machines::mass("heavy", 1)};
+    d.clutches = {machines::clutch("F", "light", "heavy", 40), machines::clutch("G", "heavy", "", 40)};
+    for (Clutch& clutch : d.clutches)
+        std::get<DryFriction>(clutch.friction).factor_over_slip = {{0, 0.5}, {0.1, 1}};
+    const auto warnings = model_warnings(d);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_EQ(warnings[0],
+              "clutch \"F\": its friction rises by 200 Nm s/rad and so slows its lighter mass within 0.5 µs; "
+              "a step of 1 ms resolves no less than 4 µs");
+}
+
 TEST(Warnings, ThirdEngineOrderMeetsTheClutchMode) {
     Description d = tractor();
     Engine engine;

@@ -405,6 +405,25 @@ RandomSystem random_system_with_backlashes(std::uint64_t seed, double seconds) {
     return system;
 }
 
+RandomSystem random_system_with_friction_tables(std::uint64_t seed, double seconds) {
+    RandomSystem system = random_system(seed, seconds);
+    Dice dice(seed + 0x7ab1e);
+    for (Clutch& c : system.description.clutches) {
+        if (!dice.chance(0.7)) continue;
+        auto& law = std::get<DryFriction>(c.friction);
+        law.falling = 0;
+        double slip = 0;
+        law.factor_over_slip.emplace_back(0, dice.uniform(0.6, 1.2));
+        for (int points = dice.integer(1, 3); points > 0; --points) {
+            slip += dice.logarithmic(0.3, 30);
+            law.factor_over_slip.emplace_back(slip, dice.uniform(0.5, 1.5));
+        }
+        slip += dice.logarithmic(3, 30);  // the last slope goes on: upwards
+        law.factor_over_slip.emplace_back(slip, law.factor_over_slip.back().second + dice.uniform(0, 0.5));
+    }
+    return system;
+}
+
 double impulse(const Waveform& waveform, double until) {
     double sum = 0;
     for (const auto& p : waveform.pieces) {

@@ -26,6 +26,9 @@ RandomSystem random_system_with_freewheels(std::uint64_t seed, double seconds);
 // The same machines with play in some of their shafts.
 RandomSystem random_system_with_backlashes(std::uint64_t seed, double seconds);
 
+// The same machines with friction factors from tables in some of their clutches: rising and falling over the slip, with kinks.
+RandomSystem random_system_with_friction_tables(std::uint64_t seed, double seconds);
+
 // ∫ waveform dt from 0 to `until`.
 double impulse(const plant::Waveform& waveform, double until);
 

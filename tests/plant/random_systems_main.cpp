@@ -27,7 +27,7 @@ struct Arguments {
 const char usage[] =
     "usage: shiftrig_random_systems [--count N] [--seed S | --seeds A,B,…] [--seconds T] [--jobs J] "
     "[--substeps K] "
-    "[--kind plain|freewheels|backlashes] [--verbose]\n"
+    "[--kind plain|freewheels|backlashes|tables] [--verbose]\n"
     "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --verbose prints each "
     "that does "
     "not agree\n";
@@ -65,6 +65,8 @@ bool parse(int argc, char** argv, Arguments& a) {
             a.make = random_system_with_freewheels;
         else if (key == "--kind" && value == std::string("backlashes"))
             a.make = random_system_with_backlashes;
+        else if (key == "--kind" && value == std::string("tables"))
+            a.make = random_system_with_friction_tables;
         else
             return false;
     }

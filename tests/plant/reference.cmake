@@ -24,6 +24,10 @@ add_executable(agreement_test plant/agreement_test.cpp)
 target_link_libraries(agreement_test PRIVATE shiftrig_comparison GTest::gtest_main)
 gtest_discover_tests(agreement_test)
 
+add_executable(library_examples_test plant/library_examples_test.cpp)
+target_link_libraries(library_examples_test PRIVATE shiftrig_comparison GTest::gtest_main)
+gtest_discover_tests(library_examples_test)
+
 # Very many steps by hand: shiftrig_long_run --steps 100000000 --parked 10000000
 add_executable(shiftrig_long_run plant/long_run_main.cpp)
 target_link_libraries(shiftrig_long_run PRIVATE shiftrig_plant shiftrig_model)

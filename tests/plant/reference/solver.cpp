@@ -246,8 +246,7 @@ bool Solver::settle_meshes(When when) {
             const double overload =
                 std::max(1.0 + overload_tolerance, worst_overload(when, torques, trial, nullptr));
             // An event is located where the present combination is overloaded by no more than the tolerances.
-            if (overload < best_overload - 1e-13 ||
-                (overload <= best_overload && differing < best_changes)) {
+            if (overload < best_overload - 1e-13 || (overload <= best_overload && differing < best_changes)) {
                 best = trial;
                 best_overload = overload;
                 best_changes = differing;
@@ -542,7 +541,10 @@ double Solver::fastest_rate() {
     const Matrix k = a * stiffness.asDiagonal() * a.transpose();
     const Matrix d =
         a * damping.asDiagonal() * a.transpose() + root.asDiagonal() * system_.damper * root.asDiagonal();
-    return std::max(std::sqrt(k.operatorNorm()), d.operatorNorm());
+    double fastest = std::max(std::sqrt(k.operatorNorm()), d.operatorNorm());
+    for (const Friction& pair : system_.frictions)  // rising friction damps as well
+        fastest = std::max(fastest, pair.steepest * (root.asDiagonal() * pair.column).squaredNorm());
+    return fastest;
 }
 
 Result Solver::run(double until, const Options& options) {

@@ -42,6 +42,11 @@ Friction friction_of(const plant::Clutch& clutch, const System& system) {
         result.column -=
             unit(system.masses, system.mass(clutch.b)) / (clutch.radius > 0 ? clutch.radius : 1.0);
     result.nominal = law->sliding_capacity;
+    for (std::size_t i = 1; i < law->factor_over_slip.size(); ++i) {
+        const auto& [x0, y0] = law->factor_over_slip[i - 1];
+        const auto& [x1, y1] = law->factor_over_slip[i];
+        result.steepest = std::max(result.steepest, law->sliding_capacity * std::abs((y1 - y0) / (x1 - x0)));
+    }
     result.initially_held = clutch.initially_locked;
     const plant::Waveform profile = direct ? direct->profile : plant::Waveform{};
     const double constant = direct ? direct->initial : 1.0;
@@ -52,7 +57,7 @@ Friction friction_of(const plant::Clutch& clutch, const System& system) {
         return law.sliding_capacity * engagement(when) * slip_factor(law, std::abs(slip));
     };
     result.holding = [law = *law, engagement](When when, const Vector&) {
-        return law.static_ratio * law.sliding_capacity * engagement(when);
+        return law.static_ratio * law.sliding_capacity * engagement(when) * slip_factor(law, 0);
     };
     return result;
 }

@@ -36,6 +36,7 @@ struct Friction {
     std::string name;
     Vector column;
     double nominal = 0;  // [Nm] weight of the device where a torque split is not unique
+    double steepest = 0;  // of a friction table over the slip [Nm s/rad]
     bool initially_held = false;
     // Capacities [Nm] ≥ 0; sliding depends on |slip|.
     std::function<double(When, const Vector& z, double slip)> sliding;
