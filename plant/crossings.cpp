@@ -221,8 +221,9 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
     }
     for (const BacklashLaw& law : m.backlashes) {
         if (!is_flank_violated(w, law, end)) continue;
-        const double g0 = flank_margin(w, law, begin), g1 = flank_margin(w, law, end);
-        const double gm = flank_margin_half_way(w, law);
+        const Flank flank = violated_flank(w, law, end);
+        const double g0 = margin_of(w, flank, begin), gm = margin_half_way(w, flank),
+                     g1 = margin_of(w, flank, end);
         const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
         if (first.device < 0 || theta < first.theta) first = {law.device, theta, Change::flank};
     }

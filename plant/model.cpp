@@ -209,7 +209,8 @@ void build_sizes(ModelData& m) {
 }
 
 // A contact of flanks can be as short as half a period of the lightest motion they allow. The parts of a step have to
-// see it, and its events have to have room.
+// see it, and its events have to have room. Forces that swing with it (a load that grows with speed) cost a part of turn
+// ωh a phase of order (ωh)⁴, which hundreds of contacts add up: half a radian, not one.
 void bound_step(ModelData& m) {
     m.maximum_events = m.description.maximum_events;
     m.maximum_parts = m.description.maximum_parts;
@@ -219,7 +220,7 @@ void bound_step(ModelData& m) {
             mobility += link.factor * link.factor / m.structure.inertia[static_cast<std::size_t>(link.mass)];
         const double turn = std::sqrt(law.stiffness * mobility) * m.options.step_size;  // ωh
         m.maximum_events += 2 * static_cast<int>(std::ceil(std::min(turn, 1e4) / 3)) + 2;
-        while (m.maximum_parts > 1 && m.maximum_parts < turn && m.maximum_parts < 1 << 14)
+        while (m.maximum_parts > 1 && m.maximum_parts < 2 * turn && m.maximum_parts < 1 << 14)
             m.maximum_parts *= 2;
     }
 }
