@@ -246,8 +246,7 @@ bool Solver::settle_meshes(When when) {
             const double overload =
                 std::max(1.0 + overload_tolerance, worst_overload(when, torques, trial, nullptr));
             // An event is located where the present combination is overloaded by no more than the tolerances.
-            if (overload < best_overload - 1e-13 ||
-                (overload <= best_overload && differing < best_changes)) {
+            if (overload < best_overload - 1e-13 || (overload <= best_overload && differing < best_changes)) {
                 best = trial;
                 best_overload = overload;
                 best_changes = differing;
@@ -530,8 +529,7 @@ void Solver::rk4(double t, double inside, double h, Vector& out, Energy& energy)
     out = z + h / 6 * (k1_ + 2 * k2_ + 2 * k3_ + k4_);
 }
 
-// Bound on the eigenvalues of the free machine: no mode with more constraints is faster.
-double Solver::fastest_rate() {
+Solver::Rates Solver::fastest_rates() const {
     const Vector root = system_.inertia.cwiseSqrt().cwiseInverse();
     const Matrix a = root.asDiagonal() * system_.shaft_columns;
     Vector stiffness = system_.stiffness, damping = system_.damping;
@@ -542,13 +540,18 @@ double Solver::fastest_rate() {
     const Matrix k = a * stiffness.asDiagonal() * a.transpose();
     const Matrix d =
         a * damping.asDiagonal() * a.transpose() + root.asDiagonal() * system_.damper * root.asDiagonal();
-    return std::max(std::sqrt(k.operatorNorm()), d.operatorNorm());
+    return {std::sqrt(k.operatorNorm()), d.operatorNorm()};
 }
 
 Result Solver::run(double until, const Options& options) {
     Result result;
-    result.fastest_rate = fastest_rate();
-    const double largest = std::min(options.step, options.resolution / std::max(result.fastest_rate, 1e-9));
+    const Rates rates = fastest_rates();
+    result.fastest_rate = std::max(rates.swing, rates.decay);
+    // A step of turn ωh leaves its phase off by (ωh)⁵/120.
+    const double swing = std::max(rates.swing, 1e-9),
+                 turn = std::pow(120 * options.phase / (swing * until), 0.25);
+    const double largest =
+        std::min({options.step, options.resolution / std::max(result.fastest_rate, 1e-9), turn / swing});
     const auto grid_points = static_cast<long>(std::lround(until / options.grid));
     std::size_t next_break = 0;
     double t = time_;
