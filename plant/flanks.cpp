@@ -83,7 +83,8 @@ double touch_between(const Work& w, const BacklashLaw& law, const Sample& begin,
     for (const double theta : {q / (3 * a), c / q}) {
         if (!(theta > 1e-3 && theta < first)) continue;
         const double twist = from + theta * (c + theta * (b + theta * a)), side = twist < 0 ? -1 : 1;
-        if (side * twist > law.half_gap && side * to < law.half_gap) first = theta;
+        // At the end it may be strained yet, and recede faster than its damping lets it follow.
+        if (side * twist > law.half_gap && open_margin(law, side, to, to_rate) > 0) first = theta;
     }
     return first;
 }

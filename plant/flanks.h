@@ -36,8 +36,8 @@ inline bool is_flank_violated(const BacklashLaw& law, double margin) noexcept {
     return margin < -flank_rounding(law);
 }
 bool is_flank_violated(const Work& work, const BacklashLaw& law, const Sample& sample) SHIFTRIG_REALTIME;
-// Where between begin and end an open play has its widest twist within the part, if that is beyond a flank which it has left
-// again at the end; 1: nowhere. The twist is taken as the cubic through both ends.
+// Where between begin and end an open play has its widest twist within the part, if that is beyond a flank which does not
+// press any more at the end; 1: nowhere. The twist is taken as the cubic through both ends.
 double touch_between(const Work& work, const BacklashLaw& law, const Sample& begin,
                      const Sample& end) SHIFTRIG_REALTIME;
 bool flanks_hold(const Work& work, const Sample& end) SHIFTRIG_REALTIME;

@@ -184,10 +184,13 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
             reached = done;
         } else if (inside && first.theta < 1 - instant) {
             reached = approach_any(w, *mode, first, done, until);
-            // An estimate that came too late passed over another change, which goes first.
+            // An estimate that came too late passed over another change, which goes first; of flanks also what approach()
+            // goes beyond the crossing, since the power of a mesh often turns in the instant that lets one go.
             for (int passed = 0; passed < 2; ++passed) {
-                const Crossing earlier = first_crossing(w, *mode, s.begin, s.end);
-                if (earlier.device < 0 || earlier.device == first.device || earlier.theta > 0.999) break;
+                Crossing earlier = first_crossing(w, *mode, s.begin, s.end);
+                if (earlier.device == first.device || earlier.theta > 0.999)
+                    earlier = first_flank(w, s.begin, s.end);
+                if (earlier.device < 0 || earlier.device == first.device) break;
                 first = earlier;
                 reached = approach_any(w, *mode, first, done, reached);
             }

@@ -235,6 +235,7 @@ Description perturbed(Description d, double relative, std::uint64_t seed) {
     for (auto& m : d.masses) m.initial_speed *= factor();
     for (auto& c : d.clutches) std::get<DryFriction>(c.friction).sliding_capacity *= factor();
     for (auto& f : d.freewheels) f.rated_torque *= factor();
+    for (auto& b : d.backlashes) b.initial_twist *= factor();
     for (auto& s : d.sources) {
         const double f = factor();
         for (auto& p : s.waveform.pieces) {

@@ -15,7 +15,7 @@ struct ComparisonOptions {
     double tolerance = 1e-4;     // of a signal's range
     double range_floor = 1e-3;   // a range counts as at least this share of the largest of its unit
     double rounding = 1e-9;      // of the largest value of a unit: no solution of a linear system is better
-    double perturbation = 1e-9;  // relative, on speeds, capacities and torques
+    double perturbation = 1e-9;  // relative, on speeds, twists in play, capacities and torques
     int refinement = 4;          // of the reference's step, where the runs differ
     unsigned perturbations = 4;  // choices of its signs, where the runs differ
     double event_clearance =

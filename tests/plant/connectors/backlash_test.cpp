@@ -81,6 +81,44 @@ TEST_P(EachStep, APlayCrossedWithinAPartOfAStepIsNoPlaceToChatter) {
     }
 }
 
+// A thrown mass driven back beyond the flank, from which at the end of the step it recedes faster than the damped flank
+// follows: open half way and at the end, and yet there was a contact.
+TEST_P(EachStep, ATouchIsSeenThatIsOverButStillStrainedAtTheEndOfTheStep) {
+    const double h = GetParam();
+    Pair pair;
+    pair.damping = 4;
+    const double a = pair.speed / (0.85 * h);  // turns round at 0.85 h
+    pair.half_gap = 0.5 * a * h * h * (0.85 * 0.85 - 0.2 * 0.2);
+    Description d = pair.description();
+    d.sources = {source("1", constant(-a * pair.reduced())), source("2", constant(a * pair.reduced()))};
+    Rig rig(d, {h, KernelKind::automatic});
+    rig.run(h);
+    const auto closes = rig.times(EventKind::flank_closes, "B");
+    ASSERT_EQ(closes.size(), 1u);
+    EXPECT_NEAR(closes[0], 0.65 * h, 1e-8 * h);
+    EXPECT_EQ(rig.times(EventKind::flank_opens, "B").size(), 1u);
+}
+
+// What lets the flank go takes the torque from the lossy gear behind it: both change in one instant.
+TEST_P(EachStep, AFlankLetsGoOnTimeThoughTheGearBehindItTurns) {
+    Pair pair;
+    pair.j2 = 0.2;
+    Description d = pair.description();
+    d.masses = {mass("1", pair.j1, 52), mass("2", pair.j2, 50), mass("3", 0.5, 25)};
+    Gear gear;
+    gear.name = "g", gear.a = "2", gear.b = "3", gear.ratio = 2, gear.efficiency = 0.9;
+    d.gears = {gear};
+    pair.j2 += 0.5 / (4 * 0.9);  // with that of the wheel, which the gear moves with û = ηu
+    const double zeta = 0.1, damped = pair.omega() * std::sqrt(1 - zeta * zeta);
+    d.backlashes[0].damping = 2 * zeta * std::sqrt(pair.stiffness * pair.reduced());
+    Rig rig(d, {GetParam(), KernelKind::automatic});
+    const double touch = pair.half_gap / pair.speed, contact = (pi - 2 * std::asin(zeta)) / damped;
+    rig.run(touch + contact + 1e-3);
+    const auto opens = rig.times(EventKind::flank_opens, "B");
+    ASSERT_EQ(opens.size(), 1u);
+    EXPECT_NEAR(opens[0], touch + contact, 1e-7 * GetParam());
+}
+
 // Each impact leaves the same share of the speed before it. A damped flank begins with a jump of its torque: what its
 // instant is late by acts on all that follow.
 TEST_P(EachStep, HundredDampedImpactsAreEachOnTime) {
