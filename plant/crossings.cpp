@@ -219,8 +219,10 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         }
         if (first.device < 0 || theta < first.theta) first = {k, theta, change};
     }
-    const Crossing flank = first_flank(w, begin, end);
-    if (flank.device >= 0 && (first.device < 0 || flank.theta < first.theta)) first = flank;
+    if (!m.backlashes.empty()) {
+        const Crossing flank = first_flank(w, begin, end);
+        if (flank.device >= 0 && (first.device < 0 || flank.theta < first.theta)) first = flank;
+    }
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
         const int leader = mode.rows[r] - m.pairs - m.meshes;
         const double drive = release_drive(w, mode, leader, end);

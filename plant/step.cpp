@@ -119,11 +119,13 @@ double approach_flank(Work& w, const Mode& mode, const Crossing& crossing, doubl
     return high;
 }
 
-// A flank that has just been let go may come back within the part, which the parabola through its margins takes for the
-// beginning.
-bool is_flank_to_come(const Work& w, const Crossing& crossing, double length) SHIFTRIG_REALTIME {
-    return crossing.change == Change::flank && length > 2 * instant &&
-           flank_margin(w, backlash_of(w, crossing.device), w.scratch.begin) > 0;
+// Does the device change where the part begins? What a mesh does by itself it does only beyond its limit: there is always a
+// little way to go. So it is to a flank that was let go just now and comes back within the part, which the parabola
+// through its margins takes for the beginning.
+bool changes_at_once(const Work& w, const Crossing& crossing, double length) SHIFTRIG_REALTIME {
+    if (acts_by_itself(crossing.change) || crossing.theta * length >= instant) return false;
+    return crossing.change != Change::flank || length <= 2 * instant ||
+           flank_margin(w, backlash_of(w, crossing.device), w.scratch.begin) <= 0;
 }
 
 double approach_any(Work& w, const Mode& mode, const Crossing& crossing, double done,
@@ -178,9 +180,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         const bool inside =
             first.device >= 0 && localise && outputs.certificate.events * length < m.maximum_events;
         double reached = until;
-        // What a mesh does by itself it does only beyond its limit: there is always a little way to go.
-        const bool on_its_way = acts_by_itself(first.change) || is_flank_to_come(w, first, until - done);
-        if (inside && !on_its_way && first.theta * (until - done) < instant) {
+        if (inside && changes_at_once(w, first, until - done)) {
             reached = done;
         } else if (inside && first.theta < 1 - instant) {
             reached = approach_any(w, *mode, first, done, until);
