@@ -209,12 +209,9 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         }
         if (first.device < 0 || theta < first.theta) first = {k, theta, change};
     }
-    for (const BacklashLaw& law : m.backlashes) {
-        if (!is_flank_violated(w, law, end)) continue;
-        const double g0 = flank_margin(w, law, begin), g1 = flank_margin(w, law, end);
-        const double gm = flank_margin_half_way(w, law);
-        const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
-        if (first.device < 0 || theta < first.theta) first = {law.device, theta, Change::flank};
+    if (!m.backlashes.empty()) {
+        const Crossing flank = first_flank(w, begin, end);
+        if (flank.device >= 0 && (first.device < 0 || flank.theta < first.theta)) first = flank;
     }
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
         const int leader = mode.rows[r] - m.pairs - m.meshes;
@@ -253,6 +250,19 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
             continue;  // just turned: within rounding of the point where both losses agree
         const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
         if (first.device < 0 || theta < first.theta) first = {k, theta, Change::turn};
+    }
+    return first;
+}
+
+Crossing first_flank(const Work& w, const Sample& begin, const Sample& end) SHIFTRIG_REALTIME {
+    Crossing first;
+    for (const BacklashLaw& law : w.model.backlashes) {
+        if (!is_flank_violated(w, law, end)) continue;
+        const Flank flank = violated_flank(w, law, end);
+        const double g0 = margin_of(w, flank, begin), g1 = margin_of(w, flank, end);
+        const double gm = margin_half_way(w, flank);
+        const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
+        if (first.device < 0 || theta < first.theta) first = {law.device, theta, Change::flank};
     }
     return first;
 }

@@ -14,24 +14,54 @@ struct Twist {
 Twist twist_of(const ModelData& m, const BacklashLaw& law, const Sample& s) {
     return {s.z[m.masses + law.shaft], slip_fast(m.shaft_rate[static_cast<std::size_t>(law.shaft)], s.z)};
 }
+Twist twist_half_way(const Work& w, const BacklashLaw& law) {
+    const Sample& half = w.scratch.half;
+    return {half.f[law.shaft - w.model.twists], half.slip[law.force]};
+}
 
-double flank_margin(const Work& w, const BacklashLaw& law, double twist, double rate) {
+// The one that is closed, or the nearer of two open ones.
+Flank nearest_flank(const Work& w, const BacklashLaw& law, Twist t) {
     const double side = flank_side(w.contact[law.device]);
-    if (side != 0) return closed_margin(law, side, twist, rate);
-    return std::min(open_margin(law, 1, twist, rate), open_margin(law, -1, twist, rate));
+    if (side != 0) return {law, side, true};
+    const bool forward = open_margin(law, 1, t.angle, t.rate) < open_margin(law, -1, t.angle, t.rate);
+    return {law, forward ? 1. : -1., false};
+}
+double margin_of(const Flank& flank, Twist t) {
+    return flank.closed ? closed_margin(flank.law, flank.side, t.angle, t.rate)
+                        : open_margin(flank.law, flank.side, t.angle, t.rate);
 }
 
 }  // namespace
 
 double flank_margin(const Work& w, const BacklashLaw& law, const Sample& s) SHIFTRIG_REALTIME {
-    const auto [twist, rate] = twist_of(w.model, law, s);
-    return flank_margin(w, law, twist, rate);
+    const Twist t = twist_of(w.model, law, s);
+    return margin_of(nearest_flank(w, law, t), t);
 }
 
 double flank_margin_half_way(const Work& w, const BacklashLaw& law) SHIFTRIG_REALTIME {
-    const Sample& half = w.scratch.half;
-    const double twist = half.f[law.shaft - w.model.twists], rate = half.slip[law.force];
-    return flank_margin(w, law, twist, rate);
+    const Twist t = twist_half_way(w, law);
+    return margin_of(nearest_flank(w, law, t), t);
+}
+
+Flank violated_flank(const Work& w, const BacklashLaw& law, const Sample& end) SHIFTRIG_REALTIME {
+    return nearest_flank(w, law, twist_of(w.model, law, end));
+}
+
+double margin_of(const Work& w, const Flank& flank, const Sample& s) SHIFTRIG_REALTIME {
+    return margin_of(flank, twist_of(w.model, flank.law, s));
+}
+
+double margin_half_way(const Work& w, const Flank& flank) SHIFTRIG_REALTIME {
+    return margin_of(flank, twist_half_way(w, flank.law));
+}
+
+double margin_rate(const Work& w, const Flank& flank, const Sample& s) SHIFTRIG_REALTIME {
+    const auto& [law, side, closed] = flank;
+    const auto& links = w.model.shaft_rate[static_cast<std::size_t>(law.shaft)];
+    const double rate = slip_fast(links, s.z), acceleration = slip_fast(links, s.rate);
+    const bool damped = closed || side * rate < 0;
+    const double rises = side * (law.stiffness * rate + (damped ? law.damping * acceleration : 0));
+    return closed ? rises : -rises;
 }
 
 bool is_flank_violated(const Work& w, const BacklashLaw& law, const Sample& s) SHIFTRIG_REALTIME {
@@ -53,7 +83,8 @@ double touch_between(const Work& w, const BacklashLaw& law, const Sample& begin,
     for (const double theta : {q / (3 * a), c / q}) {
         if (!(theta > 1e-3 && theta < first)) continue;
         const double twist = from + theta * (c + theta * (b + theta * a)), side = twist < 0 ? -1 : 1;
-        if (side * twist > law.half_gap && side * to < law.half_gap) first = theta;
+        // At the end it may be strained yet, and recede faster than its damping lets it follow.
+        if (side * twist > law.half_gap && open_margin(law, side, to, to_rate) > 0) first = theta;
     }
     return first;
 }
@@ -69,9 +100,7 @@ void change_flank(Work& w, const BacklashLaw& law, Sample& s) SHIFTRIG_REALTIME 
     const auto [twist, rate] = twist_of(w.model, law, s);
     unsigned char& state = w.contact[law.device];
     const double side = flank_side(state);
-    const double next = side != 0                                                              ? 0
-                        : open_margin(law, 1, twist, rate) < open_margin(law, -1, twist, rate) ? 1
-                                                                                               : -1;
+    const double next = side != 0 ? 0 : nearest_flank(w, law, {twist, rate}).side;
     state = closed_flank(next);
     w.scratch.dissipated += flank_energy(law, side, twist) - flank_energy(law, next, twist);
     log_event(w, side == 0 ? EventKind::flank_closes : EventKind::flank_opens, law.device, s.at.time,

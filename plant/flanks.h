@@ -14,13 +14,30 @@ double flank_margin(const Work& work, const BacklashLaw& law, const Sample& samp
 // The same half way through a part, of which only coordinates and slips are there.
 double flank_margin_half_way(const Work& work, const BacklashLaw& law) SHIFTRIG_REALTIME;
 
+// The flank that opens or closes first before `end`, where one is violated: which of two open ones it is, no margin at the
+// beginning tells. Its margin along the part is smooth, that of the nearer one is not.
+struct Flank {
+    const BacklashLaw& law;
+    double side;
+    bool closed;
+};
+Flank violated_flank(const Work& work, const BacklashLaw& law, const Sample& end) SHIFTRIG_REALTIME;
+double margin_of(const Work& work, const Flank& flank, const Sample& sample) SHIFTRIG_REALTIME;
+double margin_half_way(const Work& work, const Flank& flank) SHIFTRIG_REALTIME;
+// Wants the sample's rates [Nm/s].
+double margin_rate(const Work& work, const Flank& flank, const Sample& sample) SHIFTRIG_REALTIME;
+
+// Of a margin [Nm].
+inline double flank_rounding(const BacklashLaw& law) noexcept {
+    return 1e-12 * (law.stiffness * law.half_gap + law.damping);
+}
 // Not by rounding: a tooth at rest that touches without load stays as it is.
 inline bool is_flank_violated(const BacklashLaw& law, double margin) noexcept {
-    return margin < -1e-12 * (law.stiffness * law.half_gap + law.damping);
+    return margin < -flank_rounding(law);
 }
 bool is_flank_violated(const Work& work, const BacklashLaw& law, const Sample& sample) SHIFTRIG_REALTIME;
-// Where between begin and end an open play has its widest twist within the part, if that is beyond a flank which it has left
-// again at the end; 1: nowhere. The twist is taken as the cubic through both ends.
+// Where between begin and end an open play has its widest twist within the part, if that is beyond a flank which does not
+// press any more at the end; 1: nowhere. The twist is taken as the cubic through both ends.
 double touch_between(const Work& work, const BacklashLaw& law, const Sample& begin,
                      const Sample& end) SHIFTRIG_REALTIME;
 bool flanks_hold(const Work& work, const Sample& end) SHIFTRIG_REALTIME;

@@ -224,8 +224,9 @@ void divide_step(ModelData& m, double reach, int most) {
 }
 
 // A contact of flanks can be as short as half a period of the lightest motion they allow. The parts of a step have to
-// see it, and its events have to have room. Friction that rises with speed is a damper that the step does not take
-// exactly: its parts must not be longer than its time constant.
+// see it, and its events have to have room. Forces that swing with it (a load that grows with speed) cost a part of turn
+// ωh a phase of order (ωh)⁴, which hundreds of contacts add up: half a radian, not one. Friction that rises with speed is
+// a damper that the step does not take exactly: its parts must not be longer than its time constant.
 void bound_step(ModelData& m) {
     constexpr int most_for_flanks = 1 << 14, most_for_friction = 256;
     m.maximum_events = m.description.maximum_events;
@@ -241,7 +242,7 @@ void bound_step(ModelData& m) {
             mobility_between(m, m.structure.shafts[static_cast<std::size_t>(law.shaft)].links);
         const double turn = std::sqrt(law.stiffness * mobility) * m.options.step_size;  // ωh
         m.maximum_events += 2 * static_cast<int>(std::ceil(std::min(turn, 1e4) / 3)) + 2;
-        divide_step(m, turn, most_for_flanks);
+        divide_step(m, 2 * turn, most_for_flanks);
     }
 }
 

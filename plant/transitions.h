@@ -36,6 +36,9 @@ struct Crossing {
 // they swing within the step, reversals of power are looked for as well; elsewhere correct_directions() does.
 Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME;
 
+// The same among flanks alone.
+Crossing first_flank(const Work& work, const Sample& begin, const Sample& end) SHIFTRIG_REALTIME;
+
 // Has a flank closed or opened half way that at the end is as it was? The part is too long for it.
 bool hides_contact(const Work& work) SHIFTRIG_REALTIME;
 

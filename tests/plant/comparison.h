@@ -15,7 +15,9 @@ struct ComparisonOptions {
     double tolerance = 1e-4;     // of a signal's range
     double range_floor = 1e-3;   // a range counts as at least this share of the largest of its unit
     double rounding = 1e-9;      // of the largest value of a unit: no solution of a linear system is better
-    double perturbation = 1e-9;  // relative, on speeds, capacities and torques
+    double perturbation = 1e-9;  // relative, on speeds, twists in play, capacities and torques
+    int refinement = 4;          // of the reference's step, where the runs differ
+    unsigned perturbations = 4;  // choices of its signs, where the runs differ
     double event_clearance =
         2e-5;  // torques jump with contact states: samples nearer to a change are left out [s]
 };
@@ -52,7 +54,7 @@ Deviation deviation(const plant::Description& description, const reference::Resu
                     const reference::Result& other, const ComparisonOptions& options);
 
 reference::Result run_reference(const plant::Description& description, const ComparisonOptions& options,
-                                reference::Sharing sharing = reference::Sharing::free);
+                                reference::Sharing sharing = reference::Sharing::free, int refinement = 1);
 plant::Description perturbed(plant::Description description, double relative, std::uint64_t seed);
 
 Comparison compare(const RandomSystem& system, std::uint64_t seed, const ComparisonOptions& options);

@@ -54,14 +54,14 @@ void expect_bounces(const Pair& pair, double h, double seconds, double time_tole
                  momentum = 50 * (pair.j1 + pair.j2);
     EXPECT_NEAR(pair.j1 * rig.out("mass.1.speed") + pair.j2 * rig.out("mass.2.speed"), momentum,
                 rounding * momentum);
-    // Whatever instants are missed by is strain that changes hands: 1e-5 of a step's way, squared.
+    // Whatever instants are missed by is strain that changes hands: 1e-9 of a step's way, squared.
     EXPECT_NEAR(rig.out("energy.dissipated"), 0,
-                1e-8 * pair.relative_energy() * static_cast<double>(closes.size()));
+                1e-11 * pair.relative_energy() * static_cast<double>(closes.size()));
     EXPECT_NEAR(rig.out("energy.defect"), 0, rounding * 0.5 * 50 * momentum);
 }
 
 TEST_P(EachStep, AMassBouncesInAGapWithThePeriodOfFlightAndContact) {
-    expect_bounces(Pair{}, GetParam(), 2, 2e-6 * GetParam() / 1e-3);
+    expect_bounces(Pair{}, GetParam(), 2, 1e-12);
 }
 
 // ωh = 18 at 1 ms: six contacts could begin and end within one step.
@@ -69,7 +69,80 @@ TEST_P(EachStep, TeethStifferThanTheStepBounceWithTheSamePeriod) {
     Pair pair;
     pair.stiffness = 1e8;
     pair.half_gap = 1e-3;
-    expect_bounces(pair, GetParam(), 0.5, 1e-7);
+    expect_bounces(pair, GetParam(), 0.5, 2e-12);
+}
+
+// Let go by one flank and stopped by the other within half a part.
+TEST_P(EachStep, APlayCrossedWithinAPartOfAStepIsNoPlaceToChatter) {
+    for (const double half_gap : {1e-4, 1e-5, 1e-6, 1e-8}) {
+        Pair pair;
+        pair.half_gap = half_gap;
+        expect_bounces(pair, GetParam(), 2, 1e-12);
+    }
+}
+
+// A thrown mass driven back beyond the flank, from which at the end of the step it recedes faster than the damped flank
+// follows: open half way and at the end, and yet there was a contact.
+TEST_P(EachStep, ATouchIsSeenThatIsOverButStillStrainedAtTheEndOfTheStep) {
+    const double h = GetParam();
+    Pair pair;
+    pair.damping = 4;
+    const double a = pair.speed / (0.85 * h);  // turns round at 0.85 h
+    pair.half_gap = 0.5 * a * h * h * (0.85 * 0.85 - 0.2 * 0.2);
+    Description d = pair.description();
+    d.sources = {source("1", constant(-a * pair.reduced())), source("2", constant(a * pair.reduced()))};
+    Rig rig(d, {h, KernelKind::automatic});
+    rig.run(h);
+    const auto closes = rig.times(EventKind::flank_closes, "B");
+    ASSERT_EQ(closes.size(), 1u);
+    EXPECT_NEAR(closes[0], 0.65 * h, 1e-8 * h);
+    EXPECT_EQ(rig.times(EventKind::flank_opens, "B").size(), 1u);
+}
+
+// What lets the flank go takes the torque from the lossy gear behind it: both change in one instant.
+TEST_P(EachStep, AFlankLetsGoOnTimeThoughTheGearBehindItTurns) {
+    Pair pair;
+    pair.j2 = 0.2;
+    Description d = pair.description();
+    d.masses = {mass("1", pair.j1, 52), mass("2", pair.j2, 50), mass("3", 0.5, 25)};
+    Gear gear;
+    gear.name = "g", gear.a = "2", gear.b = "3", gear.ratio = 2, gear.efficiency = 0.9;
+    d.gears = {gear};
+    pair.j2 += 0.5 / (4 * 0.9);  // with that of the wheel, which the gear moves with û = ηu
+    const double zeta = 0.1, damped = pair.omega() * std::sqrt(1 - zeta * zeta);
+    d.backlashes[0].damping = 2 * zeta * std::sqrt(pair.stiffness * pair.reduced());
+    Rig rig(d, {GetParam(), KernelKind::automatic});
+    const double touch = pair.half_gap / pair.speed, contact = (pi - 2 * std::asin(zeta)) / damped;
+    rig.run(touch + contact + 1e-3);
+    const auto opens = rig.times(EventKind::flank_opens, "B");
+    ASSERT_EQ(opens.size(), 1u);
+    EXPECT_NEAR(opens[0], touch + contact, 1e-8 * GetParam());
+}
+
+// Each impact leaves the same share of the speed before it. A damped flank begins with a jump of its torque: what its
+// instant is late by acts on all that follow.
+TEST_P(EachStep, HundredDampedImpactsAreEachOnTime) {
+    Pair pair;
+    const double zeta = 0.01;
+    pair.stiffness = 1e7;
+    pair.half_gap = 1e-3;
+    pair.damping = 2 * zeta * std::sqrt(pair.stiffness * pair.reduced());
+    Rig rig(pair.description(), {GetParam(), KernelKind::automatic});
+    rig.run(0.8);
+    const auto closes = rig.times(EventKind::flank_closes, "B");
+    ASSERT_GE(closes.size(), 100u);
+    const double damped = pair.omega() * std::sqrt(1 - zeta * zeta);
+    const double contact = (pi - 2 * std::asin(zeta)) / damped;
+    const double restitution = std::exp(-zeta * pair.omega() * contact);
+    const double strain =
+        2 * zeta / pair.omega();  // time to fly through what the spring holds when the flank opens
+    double touch = pair.half_gap / pair.speed, speed = pair.speed;
+    for (std::size_t n = 0; n < 100; ++n) {
+        ASSERT_NEAR(closes[n], touch, 4e-9 * GetParam() / 1e-3) << n;
+        touch += contact + 2 * pair.half_gap / (speed * restitution) + strain;
+        speed *= restitution;
+    }
+    EXPECT_EQ(rig.fall_backs, 0);
 }
 
 TEST_P(EachStep, ADampedImpactLastsAndRestoresWhatTheClosedFormSays) {
@@ -84,14 +157,14 @@ TEST_P(EachStep, ADampedImpactLastsAndRestoresWhatTheClosedFormSays) {
                opens = rig.times(EventKind::flank_opens, "B");
     ASSERT_EQ(closes.size(), 1u);
     ASSERT_EQ(opens.size(), 1u);
-    EXPECT_NEAR(closes[0], touch, 1e-5 * GetParam());
-    EXPECT_NEAR(opens[0], touch + contact, 2e-5 * GetParam());
+    EXPECT_NEAR(closes[0], touch, 1e-9 * GetParam());
+    EXPECT_NEAR(opens[0], touch + contact, 1e-8 * GetParam());
     // ψ̇ at M = 0, with ψ = v/ω_d e^(−ζωt) sin ω_d t.
     const double decay = std::exp(-zeta * pair.omega() * contact);
     const double left =
         pair.speed * decay *
         (std::cos(damped * contact) - zeta * pair.omega() / damped * std::sin(damped * contact));
-    EXPECT_NEAR(rig.out("mass.1.speed") - rig.out("mass.2.speed"), left, 1e-6);
+    EXPECT_NEAR(rig.out("mass.1.speed") - rig.out("mass.2.speed"), left, 1e-11);
     // All that is gone was lost in the flank: while it was closed, and with the strain it still had when it opened.
     EXPECT_NEAR(rig.out("energy.dissipated"), pair.relative_energy() - 0.5 * pair.reduced() * left * left,
                 1e-5 * pair.relative_energy());
@@ -126,8 +199,8 @@ TEST_P(EachStep, AReversalOfTorqueCrossesThePlayInTheTimeOfFreeFlight) {
                opens = rig.times(EventKind::flank_opens, "B");
     ASSERT_GE(opens.size(), 1u);
     ASSERT_GE(closes.size(), 1u);
-    EXPECT_NEAR(opens[0], opening, 2e-5 * GetParam());
-    EXPECT_NEAR(closes[0], opening + flight, 2e-5 * GetParam());
+    EXPECT_NEAR(opens[0], opening, 1e-8 * GetParam());
+    EXPECT_NEAR(closes[0], opening + flight, 1e-8 * GetParam());
 }
 
 TEST_P(EachStep, FlanksPressNeverPullAndCarryNothingInThePlay) {
@@ -183,6 +256,25 @@ TEST(Backlash, TheOrderAcrossItsEventsIsThatOfTheMethod) {
     }
     const double order = std::log2(errors.front() / errors.back()) / 3;
     EXPECT_GT(order, 2.5) << errors[0] << ' ' << errors[1] << ' ' << errors[2] << ' ' << errors[3];
+}
+
+// A load that grows with speed swings with each contact, here of ωh = 11 at 1 ms: forces that a part of the step takes by
+// three samples.
+TEST(Backlash, ALoadThatSwingsWithTheContactsShiftsNoInstant) {
+    const auto closes = [](double h) {
+        Pair pair;
+        pair.j1 = 0.09, pair.j2 = 0.04, pair.stiffness = 3.4e6, pair.half_gap = 3e-6, pair.speed = 0.15;
+        Description d = pair.description();
+        d.sources = {source("1", constant(-20)), source("2", constant(20))};
+        d.sources[0].quadratic = 0.002;
+        Rig rig(d, {h, KernelKind::automatic});
+        rig.run(0.2);
+        return rig.times(EventKind::flank_closes, "B");
+    };
+    const auto coarse = closes(1e-3), fine = closes(1e-5);
+    ASSERT_GE(fine.size(), 300u);
+    ASSERT_EQ(coarse.size(), fine.size());
+    for (std::size_t n = 0; n < fine.size(); ++n) ASSERT_NEAR(coarse[n], fine[n], 2e-8) << n;
 }
 
 // The gap of a thousandth of a step's way, and an impulse that arrives through a clutch that closes.

@@ -529,8 +529,7 @@ void Solver::rk4(double t, double inside, double h, Vector& out, Energy& energy)
     out = z + h / 6 * (k1_ + 2 * k2_ + 2 * k3_ + k4_);
 }
 
-// Bound on the eigenvalues of the free machine: no mode with more constraints is faster.
-double Solver::fastest_rate() {
+Solver::Rates Solver::fastest_rates() const {
     const Vector root = system_.inertia.cwiseSqrt().cwiseInverse();
     const Matrix a = root.asDiagonal() * system_.shaft_columns;
     Vector stiffness = system_.stiffness, damping = system_.damping;
@@ -541,16 +540,21 @@ double Solver::fastest_rate() {
     const Matrix k = a * stiffness.asDiagonal() * a.transpose();
     const Matrix d =
         a * damping.asDiagonal() * a.transpose() + root.asDiagonal() * system_.damper * root.asDiagonal();
-    double fastest = std::max(std::sqrt(k.operatorNorm()), d.operatorNorm());
+    double fading = d.operatorNorm();
     for (const Friction& pair : system_.frictions)  // rising friction damps as well
-        fastest = std::max(fastest, pair.steepest * (root.asDiagonal() * pair.column).squaredNorm());
-    return fastest;
+        fading = std::max(fading, pair.steepest * (root.asDiagonal() * pair.column).squaredNorm());
+    return {std::sqrt(k.operatorNorm()), fading};
 }
 
 Result Solver::run(double until, const Options& options) {
     Result result;
-    result.fastest_rate = fastest_rate();
-    const double largest = std::min(options.step, options.resolution / std::max(result.fastest_rate, 1e-9));
+    const Rates rates = fastest_rates();
+    result.fastest_rate = std::max(rates.swing, rates.decay);
+    // A step of turn ωh leaves its phase off by (ωh)⁵/120.
+    const double swing = std::max(rates.swing, 1e-9),
+                 turn = std::pow(120 * options.phase / (swing * until), 0.25);
+    const double largest =
+        std::min({options.step, options.resolution / std::max(result.fastest_rate, 1e-9), turn / swing});
     const auto grid_points = static_cast<long>(std::lround(until / options.grid));
     std::size_t next_break = 0;
     double t = time_;

@@ -12,6 +12,7 @@ namespace shiftrig::reference {
 struct Options {
     double step = 5e-6;        // largest step [s]; refined where the machine is stiffer
     double resolution = 0.05;  // step·(fastest rate) stays below this
+    double phase = 1e-6;       // by which the fastest swing may be off at the end of a run [rad]
     double grid = 1e-3;        // [s] of the samples
     int event_limit = 2000;    // beyond it the run is given up as chattering
 };
@@ -88,7 +89,11 @@ class Solver {
     // must hold M̃ of the same instant.
     Energy power(When when, const Vector& state, const Vector& force);
     double stored_energy() const;
-    double fastest_rate();
+    // Bounds on the eigenvalues of the free machine [1/s]; no mode with more constraints is faster.
+    struct Rates {
+        double swing, decay;
+    };
+    Rates fastest_rates() const;
 
     const System& system_;
     double time_ = 0;
