@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "plant/rest_problem.h"
 #include "plant/standstill.h"
@@ -126,9 +127,13 @@ bool lean_on_losses(Work& w, const Mode& mode, const Use& most, Sample& s) SHIFT
             trial[k] = moving(direction,
                               w.scratch.torque_copy[static_cast<std::size_t>(k)] * direction < 0 ? -1 : 1);
             contact_forces(w, trial, s);
+            const int flags = std::exchange(w.outputs.certificate.flags, 0);
             const Mode& leaning = find_directions(w, trial, s);
+            const bool agrees = (w.outputs.certificate.flags & 2) == 0;  // else it is no split of the torques
+            w.outputs.certificate.flags |= flags;
             const double relieved = most_used(w, w.contact, s).share;
-            if (!leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
+            // Dense machines were all compared with those in.
+            if ((mode.tree && !agrees) || !leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
             use = relieved;
             found = true;
             std::copy(trial, trial + m.contact_bytes, w.scratch.release.data());

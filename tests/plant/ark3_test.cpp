@@ -104,10 +104,12 @@ TEST(Ark3, RunsOfRandomForestsAgreeWithTheDenseEngine) {
 }
 
 // Behind the first hundred: those in which trains at rest have to share out their loads anew. In most a mesh takes part
-// of what is too much for a brake; in 194, 222, 388, 507 and 571 pairs and meshes hand it on to one another.
+// of what is too much for a brake; in 194, 222, 388, 507 and 571 pairs and meshes hand it on to one another; in 777 no
+// loss directions agree with some of the splits.
 TEST(Ark3, RunsWithLossyGearsAgreeWithTheDenseEngine) {
     Agreement result;
-    compare_runs(true, forests(100, {114, 125, 170, 194, 216, 222, 388, 418, 433, 477, 507, 516, 543, 571}),
+    compare_runs(true,
+                 forests(100, {114, 125, 170, 194, 216, 222, 388, 418, 433, 477, 507, 516, 543, 571, 777}),
                  1e-4, result);
     EXPECT_EQ(result.differ, 0) << result.worst;
 }
