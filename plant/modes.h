@@ -125,6 +125,7 @@ struct OperatorsData {
     std::vector<TreeMode> trees;  // one per mode where the model has a tree
     std::vector<TreeMass> tree_masses;
     std::uint64_t clock = 0;
+    const Mode* in_force = nullptr;             // not forgotten while other contact states are tried
     Mode* recent = nullptr;                     // the last one found,
     std::vector<unsigned char> recent_contact;  // for these contact states
     std::vector<unsigned char> wanted;          // key being looked up

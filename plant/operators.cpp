@@ -110,29 +110,27 @@ void OperatorsData::place_trees(const ModelData& m) {
 Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* contact,
                 ScratchData& scratch) SHIFTRIG_REALTIME {
     const auto contact_bytes = static_cast<std::size_t>(m.contact_bytes);
-    if (o.recent && same_bytes(o.recent_contact.data(), contact, contact_bytes)) {
-        o.recent->last_use = ++o.clock;
-        return *o.recent;
-    }
+    const auto found = [&](Mode& mode) -> Mode& {
+        mode.last_use = ++o.clock;
+        o.recent = &mode;
+        if (contact != scratch.trial.data()) o.in_force = &mode;
+        return mode;
+    };
+    if (o.recent && same_bytes(o.recent_contact.data(), contact, contact_bytes)) return found(*o.recent);
     std::copy(contact, contact + contact_bytes, o.recent_contact.begin());
     mode_key(m, contact, o.wanted.data());
     const std::size_t bytes = o.wanted.size();
-    if (o.recent && same_bytes(o.recent->key, o.wanted.data(), bytes)) {
-        o.recent->last_use = ++o.clock;
-        return *o.recent;
-    }
+    if (o.recent && same_bytes(o.recent->key, o.wanted.data(), bytes)) return found(*o.recent);
     const std::uint64_t hash = hash_of(o.wanted.data(), bytes);
     for (std::size_t i = 0; i < o.modes.size(); ++i) {
         Mode& mode = o.modes[i];
         if (o.hashes[i] != hash || mode.last_use == 0 || !same_bytes(mode.key, o.wanted.data(), bytes))
             continue;
-        mode.last_use = ++o.clock;
-        o.recent = &mode;
-        return mode;
+        return found(mode);
     }
-    Mode* oldest = o.modes.data();
+    Mode* oldest = nullptr;
     for (Mode& mode : o.modes) {
-        if (mode.last_use < oldest->last_use) oldest = &mode;
+        if (&mode != o.in_force && (!oldest || mode.last_use < oldest->last_use)) oldest = &mode;
     }
     o.hashes[static_cast<std::size_t>(oldest - o.modes.data())] = hash;
     ++o.misses;
@@ -153,9 +151,7 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
         }
     }
     list_row_links(m, *oldest);
-    oldest->last_use = ++o.clock;
-    o.recent = oldest;
-    return *oldest;
+    return found(*oldest);
 }
 
 void at_oil_temperature(const ModelData& m, OperatorsData& o, double temperature) SHIFTRIG_REALTIME {
@@ -180,6 +176,7 @@ Operators& Operators::operator=(Operators&&) noexcept = default;
 void Operators::drop() noexcept {
     for (detail::Mode& mode : data_->modes) mode.last_use = 0;
     data_->recent = nullptr;
+    data_->in_force = nullptr;
     data_->oil_known = data_->inputs_known = data_->carried = data_->table.known = false;
 }
 

@@ -25,10 +25,6 @@ void set_column(const ModelData& m, const Links& links, double* column, double s
     }
 }
 
-std::array<Link, 2> loss_links(const Mesh& mesh) {
-    return {Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}};
-}
-
 // Hands out `memory`, if there is any; returns how much of it that takes.
 int place(const ModelData& m, RestProblem& rest, double* memory) {
     const int n = most_devices(m), bends = std::min(n, static_cast<int>(m.lossy_meshes.size()));
@@ -38,12 +34,20 @@ int place(const ModelData& m, RestProblem& rest, double* memory) {
         part = memory ? memory + used : nullptr;
         used += doubles;
     };
-    take(rest.free, m.masses * (1 + n));
-    take(rest.motion, m.masses * n);
-    take(rest.mesh, m.meshes * (1 + n));
-    take(rest.columns, m.masses * m.meshes);
-    take(rest.forces, m.masses * m.meshes);
-    take(rest.g, m.meshes * m.meshes);
+    if (m.tree) {
+        TrainWork& trains = rest.trains;
+        for (double** part : {&rest.free, &trains.ratio, &trains.force_ratio, &trains.mass, &trains.load,
+                              &trains.sum, &trains.moment})
+            take(*part, m.masses);
+        take(rest.mesh, bends * (1 + n));
+    } else {
+        take(rest.free, m.masses * (1 + n));
+        take(rest.motion, m.masses * n);
+        take(rest.mesh, m.meshes * (1 + n));
+        take(rest.columns, m.masses * m.meshes);
+        take(rest.forces, m.masses * m.meshes);
+        take(rest.g, m.meshes * m.meshes);
+    }
     for (double** part : {&rest.w, &rest.response, &rest.turn, &rest.left}) take(*part, n * n);
     take(rest.inverse, n * (n + 1));
     for (double** part : {&rest.b, &rest.y, &rest.torque}) take(*part, n);
@@ -51,14 +55,20 @@ int place(const ModelData& m, RestProblem& rest, double* memory) {
     return used;
 }
 
-// Everything at rest; false: too much.
-bool list_joints(const Work& w, const Mode& mode, const Sample& s, RestProblem& rest) {
+// Does the device rest at the sample, as one that could hold something?
+bool is_joint(const Work& w, const Mode& mode, int k, const Sample& s) {
+    const bool pair = k < w.model.pairs;
+    const unsigned char state = w.contact[k];
+    if (pair ? state == free_running : !mesh_of(w, k - w.model.pairs).lossy()) return false;
+    return (pair ? state == locked : state == stuck) || is_still(w, mode, k, s);
+}
+
+// Everything at rest in the piece; false: too much.
+bool list_joints(const Work& w, const Mode& mode, const Sample& s, const Piece& piece, RestProblem& rest) {
     const ModelData& m = w.model;
+    rest.mesh_rows = mode.tree ? 0 : m.meshes;
     for (int k = 0; k < m.first_flank; ++k) {
-        const unsigned char state = w.contact[k];
-        const bool closed = k < m.pairs ? state == locked : state == stuck;
-        if (k < m.pairs ? state == free_running : !mesh_of(w, k - m.pairs).lossy()) continue;
-        if (!closed && !is_still(w, mode, k, s)) continue;
+        if (!is_joint(w, mode, k, s) || !piece.holds(k)) continue;
         if (rest.count == most_devices(m)) return false;
         RestJoint& joint = rest.joints[rest.count++];
         joint = {.device = k};
@@ -66,6 +76,7 @@ bool list_joints(const Work& w, const Mode& mode, const Sample& s, RestProblem& 
         const Mesh& mesh = mesh_of(w, k - m.pairs);
         joint.mesh = k - m.pairs;
         joint.bend = rest.bends++;
+        joint.row = mode.tree ? rest.mesh_rows++ : joint.mesh;
         joint.upper = mesh.forward_bearing;
         joint.lower = -mesh.forward_bearing;
         joint.slope = 1 - mesh.forward_efficiency;
@@ -97,10 +108,9 @@ void free_torques(const Work& w, const Mode& mode, const Sample& s, double* torq
 }
 
 // b, W and the meshes' torques; false where the meshes alone leave their torques open, or hold a pair.
-bool set_up(const Work& w, const Mode& mode, const Sample& s, RestProblem& rest) {
+bool set_up(const Work& w, RestProblem& rest) {
     const ModelData& m = w.model;
     const int n = m.masses, count = rest.count, meshes = m.meshes;
-    free_torques(w, mode, s, rest.free);
     for (int i = 0; i < count; ++i) {
         const int k = rest.joints[i].device;
         double* const pull = rest.free + (1 + i) * n;
@@ -151,11 +161,15 @@ bool set_up(const Work& w, const Mode& mode, const Sample& s, RestProblem& rest)
         if (!(mobility > 1e-12 * dot(motion, motion, n))) return false;
         rest.joints[i].scale = std::sqrt(mobility);
     }
-    // The weights of build_mode().
+    return true;
+}
+
+// How much each joint gives where loads are shared out: the weights of build_mode().
+void set_gives(const ModelData& m, RestProblem& rest) {
     double heaviest = 0, most = 0;
     for (const FrictionPair& pair : m.structure.pairs) heaviest = std::max(heaviest, pair.nominal_capacity);
     for (int pass = 0; pass < 2; ++pass) {
-        for (int i = 0; i < count; ++i) {
+        for (int i = 0; i < rest.count; ++i) {
             RestJoint& joint = rest.joints[i];
             const double weight =
                 joint.mesh < 0 ? m.structure.pairs[static_cast<std::size_t>(joint.device)].nominal_capacity
@@ -165,43 +179,56 @@ bool set_up(const Work& w, const Mode& mode, const Sample& s, RestProblem& rest)
             joint.give = most_give * give / most;
         }
     }
-    return true;
 }
 
 }  // namespace
+
+std::array<Link, 2> loss_links(const Mesh& mesh) SHIFTRIG_REALTIME {
+    return {Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}};
+}
 
 bool is_still(const Work& w, const Mode& mode, int device, const Sample& s) SHIFTRIG_REALTIME {
     return mode.bound[device] != 0 ||
            std::fabs(device_slip(w, device, s.z)) <= 1e-13 * slip_scale(w, device, s.z);
 }
 
-bool pose_rest_problem(Work& w, const Mode& mode, Sample& s, RestProblem& rest) SHIFTRIG_REALTIME {
+bool is_too_much(const Work& w, const Mode& mode, const Piece& piece, const Sample& s) SHIFTRIG_REALTIME {
+    int count = 0;
+    for (int k = 0; k < w.model.first_flank; ++k) count += is_joint(w, mode, k, s) && piece.holds(k);
+    return count > most_joints;
+}
+
+bool pose_rest_problem(Work& w, const Mode& mode, int around, Sample& s,
+                       RestProblem& rest) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    if (mode.tree) return false;
     place(m, rest, w.scratch.standstill.data());
-    if (!list_joints(w, mode, s, rest) || rest.count == 0) return false;
+    const Piece piece = piece_around(w, mode, around, s);
+    if (!list_joints(w, mode, s, piece, rest) || rest.count == 0) return false;
+    if (mode.tree && rest.count == 1) return false;  // it goes, or it does not: no need to solve for that
     unsigned char* const closed = w.scratch.trial.data();
     std::copy(w.contact, w.contact + m.contact_bytes, closed);
     for (int i = 0; i < rest.count; ++i) closed[rest.joints[i].device] = 0;  // locked, stuck
     contact_forces(w, closed, s);
-    const bool posed = set_up(w, mode, s, rest);
+    free_torques(w, mode, s, rest.free);
+    const bool posed = mode.tree ? set_up_trains(w, piece, rest) : set_up(w, rest);
+    if (posed) set_gives(m, rest);
     contact_forces(w, w.contact, s);
     return posed;
 }
 
-bool solve_rest_problem(const ModelData& m, bool shared_out, RestProblem& rest) SHIFTRIG_REALTIME {
-    const int count = rest.count, meshes = m.meshes, size = rest.size(), columns = lemke_columns(size);
+bool solve_rest_problem(bool shared_out, RestProblem& rest) SHIFTRIG_REALTIME {
+    const int count = rest.count, meshes = rest.mesh_rows, size = rest.size(), columns = lemke_columns(size);
     const auto row_of = [&](const double* matrix, int i) { return matrix + i * count; };
     // (I − H C) y = H M_0 + o + δ v − p, where M = M_0 + C y and H holds the slopes.
     for (int i = 0; i < count; ++i) {
         const RestJoint& joint = rest.joints[i];
         for (int j = 0; j < count; ++j) {
-            const double follows = joint.mesh < 0 ? 0 : rest.mesh[(1 + j) * meshes + joint.mesh];
+            const double follows = joint.mesh < 0 ? 0 : rest.mesh[(1 + j) * meshes + joint.row];
             rest.left[j * count + i] = (i == j ? 1 : 0) - joint.slope * follows;
             rest.inverse[j * count + i] = i == j ? 1 : 0;
         }
         rest.inverse[count * count + i] =
-            joint.upper + (joint.mesh < 0 ? 0 : joint.slope * rest.mesh[joint.mesh]);
+            joint.upper + (joint.mesh < 0 ? 0 : joint.slope * rest.mesh[joint.row]);
     }
     solve(rest.left, count, rest.inverse, count + 1);
     std::copy(rest.inverse + count * count, rest.inverse + count * (count + 1), rest.y);
@@ -212,10 +239,10 @@ bool solve_rest_problem(const ModelData& m, bool shared_out, RestProblem& rest) 
         const double w = rest.w[i * count + j];
         return shared_out && i == j ? w * (1 + rest.joints[i].give) : w;
     };
-    const auto turns = [&](int mesh, int j) {
+    const auto turns = [&](int mesh_row, int j) {
         double sum = 0;
         for (int l = 0; l < count; ++l)
-            sum += rest.mesh[(1 + l) * meshes + mesh] * rest.response[l * count + j];
+            sum += rest.mesh[(1 + l) * meshes + mesh_row] * rest.response[l * count + j];
         return sum;
     };
     double largest = 0;  // rows are counted in it: numbers of one size
@@ -224,10 +251,10 @@ bool solve_rest_problem(const ModelData& m, bool shared_out, RestProblem& rest) 
         rest.torque[i] = 0;
         largest = std::max({largest, std::fabs(rest.b[i]) / joint.scale, std::fabs(rest.y[i]) * joint.scale});
         if (joint.mesh < 0) continue;
-        rest.torque[i] = rest.mesh[joint.mesh];
+        rest.torque[i] = rest.mesh[joint.row];
         for (int j = 0; j < count; ++j) {
-            rest.torque[i] += rest.mesh[(1 + j) * meshes + joint.mesh] * rest.y[j];
-            rest.turn[i * count + j] = turns(joint.mesh, j);
+            rest.torque[i] += rest.mesh[(1 + j) * meshes + joint.row] * rest.y[j];
+            rest.turn[i * count + j] = turns(joint.row, j);
         }
         largest = std::max(largest, std::fabs(rest.torque[i]) * joint.scale);
     }

@@ -27,6 +27,7 @@ constexpr int most_joints = 16;
 struct RestJoint {
     int device = -1;
     int mesh = -1;                // its number among all meshes, −1: a pair
+    int row = -1;                 // where its torque stands in RestProblem::mesh
     int bend = -1;                // its number among the meshes at rest
     double upper = 0, lower = 0;  // limits of a pair, set by whoever asks; of a mesh o and −o
     double slope = 0;             // 1 − η
@@ -36,15 +37,25 @@ struct RestJoint {
     double give = 0;              // of W_ii, where loads are shared out
 };
 
+// Trains of gears by position, see tree_rest.cpp.
+struct TrainWork {
+    double *ratio = nullptr, *force_ratio = nullptr;  // r, r̂ along a train
+    double* mass = nullptr;                           // Σ r̂ r J of a position and what hangs on it
+    double *load = nullptr, *sum = nullptr;           // torques on the masses; Σ r̂ of them, then r q̇
+    double* moment = nullptr;                         // of the mesh to the parent
+};
+
 struct RestProblem {
     RestJoint joints[most_joints];
     int count = 0, bends = 0;
+    int mesh_rows = 0;  // of `mesh`: all meshes; on a tree those at rest
     int basis[4 * most_joints];
     double* free = nullptr;    // J^(−1/2) M̃, then per joint −J^(−1/2) ĉ; masses × (1 + joints)
     double* motion = nullptr;  // J^(−1/2) c, masses × joints
-    double* mesh = nullptr;    // M: meshes × (1 + joints)
+    double* mesh = nullptr;    // M: mesh_rows × (1 + joints)
     double *columns = nullptr, *forces = nullptr;  // J^(−1/2) A, Â: masses × meshes
     double* g = nullptr;                           // G
+    TrainWork trains;                              // instead of these, on a tree
     double* w = nullptr;                           // W, joints × joints, by rows like the next two
     double* response = nullptr;                    // of y to what a limit gives, joints × joints
     double* turn = nullptr;                        // of M to it, of meshes at rest
@@ -58,14 +69,36 @@ struct RestProblem {
 // Is the device at rest at the sample, by others' doing or by itself?
 bool is_still(const Work& work, const Mode& mode, int device, const Sample& sample) SHIFTRIG_REALTIME;
 
-// The problem of everything at rest at the sample, in scratch.standstill. False: nothing is, too much is, or the torques of meshes
-// in a ring of their own are not unique.
-bool pose_rest_problem(Work& work, const Mode& mode, Sample& sample, RestProblem& rest) SHIFTRIG_REALTIME;
+// The devices that may take a load from one another. On a tree those that gears, locked pairs and pairs at rest join, held
+// in scratch.workspace_index; without one all of them.
+struct Piece {
+    const ModelData* model = nullptr;
+    const int* joined = nullptr;  // by position: the first position of its piece
+    int first = -1;               // of this one
+    bool holds(int device) const SHIFTRIG_REALTIME;
+};
+Piece piece_around(const Work& work, const Mode& mode, int device, const Sample& sample) SHIFTRIG_REALTIME;
+
+// Does the piece have more devices at rest than may be asked together?
+bool is_too_much(const Work& work, const Mode& mode, const Piece& piece,
+                 const Sample& sample) SHIFTRIG_REALTIME;
+
+// The problem of everything at rest in the piece around a device at the sample, in scratch.standstill. False: nothing is,
+// too much is, or the torques of meshes in a ring of their own are not unique.
+bool pose_rest_problem(Work& work, const Mode& mode, int around, Sample& sample,
+                       RestProblem& rest) SHIFTRIG_REALTIME;
+
+// The part of it that differs on a tree: b, W and the torques of meshes at rest, from `free`. False where one of the joints
+// cannot move.
+bool set_up_trains(const Work& work, const Piece& piece, RestProblem& rest) SHIFTRIG_REALTIME;
+
+// How the loss of a mesh acts on its masses.
+std::array<Link, 2> loss_links(const Mesh& mesh) SHIFTRIG_REALTIME;
 
 // Solves it with the limits as they stand; leaves the torques of its solution in y and `torque`. `shared_out`: every
 // joint gives a little under its torque, the less the larger its nominal capacity. Of all splits of a load that is not unique
 // that is the one which the mode of the same states has. False: no solution was found.
-bool solve_rest_problem(const ModelData& model, bool shared_out, RestProblem& rest) SHIFTRIG_REALTIME;
+bool solve_rest_problem(bool shared_out, RestProblem& rest) SHIFTRIG_REALTIME;
 
 // Where joint i of the solution is: 0 within its limits, +1 at the upper one, −1 at the lower one. `going`: its acceleration,
 // as a share of what there could be.

@@ -74,9 +74,9 @@ ScratchData::ScratchData(const ModelData& m) {
     works = aligned_doubles(static_cast<std::size_t>(m.forces) + loop_slack);
     work = works.data()->value;
     workspace.assign(static_cast<std::size_t>(m.tree ? TreeWork::doubles(m) : workspace_doubles(m)), 0.);
-    if (m.tree) return;
     standstill.assign(static_cast<std::size_t>(rest_workspace(m)), 0.);
     workspace_index.assign(static_cast<std::size_t>(workspace_integers(m)), 0);
+    if (m.tree) return;
     for (auto* memory : {&operator_memory, &ledger_memory}) {
         *memory = aligned_doubles(static_cast<std::size_t>(ModeSizes(m).operators));
     }

@@ -3,25 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "plant/rest_problem.h"
 #include "plant/standstill.h"
 #include "plant/stuck_meshes.h"
 
 namespace shiftrig::plant::detail {
 namespace {
-
-// On the engine for long chains, lossy meshes that others hold at rest carry torque without loss. On the other one they
-// may lean on their loss, see lean_on_losses().
-bool rest_bound_meshes(const Work& w, const Mode& mode, unsigned char* contact) {
-    if (!mode.tree) return false;
-    bool changed = false;
-    for (int k = w.model.pairs; k < w.model.first_flank; ++k) {
-        if (contact[k] == stuck || !mode.bound[k] || !mesh_of(w, k - w.model.pairs).lossy()) continue;
-        contact[k] = stuck;
-        changed = true;
-    }
-    return changed;
-}
 
 // Pairs by their capacity: none is free, some engages. [Algin]: a change of λ by pressure.
 bool engage_and_release(Work& w, Sample& s) {
@@ -72,11 +61,6 @@ Mode& find_directions(Work& w, unsigned char* contact, Sample& s, bool complete)
     for (int flips = 0;; ++flips) {
         Mode& mode = find_mode(m, w.operators, contact, w.scratch);
         ++w.outputs.certificate.mode_lookups;
-        if (rest_bound_meshes(w, mode, contact)) {
-            contact_forces(w, contact, s);
-            complete = false;
-            continue;
-        }
         if (!complete) internal_torques(w, mode, s);
         complete = false;
         int worst = -1;
@@ -120,17 +104,21 @@ void open_pair(Work& w, const Mode& mode, int pair, Sample& s) SHIFTRIG_REALTIME
     }
     log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], static_limit(w, pair, s), 0);
     w.contact[pair] = slipping(opening_sense(w, pair, s.torque[pair], s));
-    w.scratch.overcome[static_cast<std::size_t>(pair)] = !mode.tree;
+    w.scratch.overcome[static_cast<std::size_t>(pair)] = 1;
     contact_forces(w, w.contact, s);
 }
 
-bool lean_on_losses(Work& w, const Mode& mode, double use, Sample& s) SHIFTRIG_REALTIME {
+bool lean_on_losses(Work& w, const Mode& mode, const Use& most, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    if (mode.tree) return false;
+    if (!mode.rests) return false;
+    const Piece piece = piece_around(w, mode, most.pair, s);
+    if (mode.tree && is_too_much(w, mode, piece, s)) return false;
     unsigned char* trial = w.scratch.trial.data();
+    double use = most.share;
     bool found = false, tried = false;
     for (int k = m.pairs; k < m.first_flank; ++k) {
-        if (!mesh_of(w, k - m.pairs).lossy() || (w.contact[k] != stuck && !mode.bound[k])) continue;
+        if (!mesh_of(w, k - m.pairs).lossy() || (w.contact[k] != stuck && !mode.bound[k]) || !piece.holds(k))
+            continue;
         if (!tried) std::copy(s.torque, s.torque + m.torques, w.scratch.torque_copy.data());
         tried = true;
         for (const double direction : {1., -1.}) {
@@ -139,9 +127,13 @@ bool lean_on_losses(Work& w, const Mode& mode, double use, Sample& s) SHIFTRIG_R
             trial[k] = moving(direction,
                               w.scratch.torque_copy[static_cast<std::size_t>(k)] * direction < 0 ? -1 : 1);
             contact_forces(w, trial, s);
+            const int flags = std::exchange(w.outputs.certificate.flags, 0);
             const Mode& leaning = find_directions(w, trial, s);
+            const bool agrees = (w.outputs.certificate.flags & 2) == 0;  // else it is no split of the torques
+            w.outputs.certificate.flags |= flags;
             const double relieved = most_used(w, w.contact, s).share;
-            if (!leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
+            // Dense machines were all compared with those in.
+            if ((mode.tree && !agrees) || !leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
             use = relieved;
             found = true;
             std::copy(trial, trial + m.contact_bytes, w.scratch.release.data());
@@ -167,8 +159,9 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
             if (release_stuck_meshes(w, mode, s) || leave_to_pairs(w, mode, s)) continue;
             const Use worst = most_used(w, w.contact, s);
             if (is_overloaded(w, worst.pair, s)) {
-                if (lean_on_losses(w, mode, worst.share, s)) continue;
-                if (rearrange(w, worst.pair, s) == Rearrangement::none) open_pair(w, mode, worst.pair, s);
+                if (lean_on_losses(w, mode, worst, s)) continue;
+                if (rearrange(w, worst.pair, worst.pair, s) == Rearrangement::none)
+                    open_pair(w, mode, worst.pair, s);
                 continue;
             }
         }

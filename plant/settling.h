@@ -26,6 +26,6 @@ void open_pair(Work& work, const Mode& mode, int pair, Sample& sample) SHIFTRIG_
 // A lossy mesh that others hold at rest takes any loss torque up to the limit of either direction: the machine stands as
 // long as some split of the torques is within everybody's limits. So before a pair opens, the mesh that relieves
 // the most used pair most is set to its limit. Says whether one was.
-bool lean_on_losses(Work& work, const Mode& mode, double use, Sample& sample) SHIFTRIG_REALTIME;
+bool lean_on_losses(Work& work, const Mode& mode, const Use& most, Sample& sample) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

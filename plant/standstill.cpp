@@ -89,7 +89,7 @@ struct Search {
             if (limit > 0) joint.upper = std::min(joint.upper, limit);
             if (limit < 0) joint.lower = std::max(joint.lower, limit);
         }
-        return solve_rest_problem(w.model, shared_out, rest);
+        return solve_rest_problem(shared_out, rest);
     }
 
     bool solve_exactly() {
@@ -179,7 +179,7 @@ struct Search {
 
 }  // namespace
 
-Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
+Rearrangement rearrange(Work& w, int gives_way, int around, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     Search search{.w = w,
                   .mode = find_mode(m, w.operators, w.contact, w.scratch),
@@ -187,7 +187,7 @@ Rearrangement rearrange(Work& w, int gives_way, Sample& s) SHIFTRIG_REALTIME {
                   .gives_way = gives_way,
                   .given = gives_way < 0 ? 0 : s.torque[gives_way],
                   .rest = {}};
-    if (!pose_rest_problem(w, search.mode, s, search.rest)) return Rearrangement::none;
+    if (!pose_rest_problem(w, search.mode, around, s, search.rest)) return Rearrangement::none;
     const bool found = search.find();
     contact_forces(w, w.contact, s);
     internal_torques(w, find_mode(m, w.operators, w.contact, w.scratch), s);

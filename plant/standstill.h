@@ -11,12 +11,13 @@ namespace shiftrig::plant::detail {
 // meshes and back, and what moves in the end may be a pair that has never been at its limit alone.
 //
 // Solves it for everything at rest at the sample, and puts the contact states that follow into place. `gives_way`, a locked pair or
-// −1, is at its limit whatever the last digits of its torque say. Not for long chains.
+// −1, is at its limit whatever the last digits of its torque say. On a long chain, of everything at rest that is joined to
+// device `around`.
 enum class Rearrangement {
     none,    // no solution other than the states there are
     stands,  // others carry the load, nothing moves
     moves,
 };
-Rearrangement rearrange(Work& work, int gives_way, Sample& sample) SHIFTRIG_REALTIME;
+Rearrangement rearrange(Work& work, int gives_way, int around, Sample& sample) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

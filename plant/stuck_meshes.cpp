@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "plant/dense.h"
+#include "plant/rest_problem.h"
 #include "plant/settling.h"
 #include "plant/standstill.h"
 
@@ -155,7 +156,6 @@ double loss_left(const Work& w, int mesh, const Sample& s) SHIFTRIG_REALTIME {
 
 bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    if (mode.tree) return false;
     unsigned char* trial = w.scratch.trial.data();
     double size = 0;
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
@@ -169,10 +169,11 @@ bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         double least = overload;
         int taker = -1;
         bool asked = false;
+        const Piece piece = piece_around(w, mode, device, s);
         for (int k = 0; k < m.pairs; ++k) {
             if (!slips(w.contact[k]) || !mode.bound[k] || w.scratch.overcome[static_cast<std::size_t>(k)])
                 continue;
-            if (std::fabs(device_slip(w, k, s.z)) > at_rest) continue;
+            if (std::fabs(device_slip(w, k, s.z)) > at_rest || !piece.holds(k)) continue;
             asked = true;
             std::copy(w.contact, w.contact + m.contact_bytes, trial);
             trial[device] = moving(direction, x);
@@ -192,7 +193,7 @@ bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         contact_forces(w, w.contact, s);
         if (taker >= 0) return true;
         internal_torques(w, mode, s);
-        if (asked && rearrange(w, -1, s) != Rearrangement::none) return true;
+        if (asked && rearrange(w, -1, device, s) != Rearrangement::none) return true;
     }
     return false;
 }

@@ -129,8 +129,8 @@ bool change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
         change_flank(w, backlash_of(w, device), s);
     } else if (device < w.model.pairs && w.contact[device] == locked) {
         const Mode& mode = find_mode(w.model, w.operators, w.contact, w.scratch);
-        if (lean_on_losses(w, mode, most_used(w, w.contact, s).share, s)) return false;
-        const Rearrangement found = rearrange(w, device, s);
+        if (lean_on_losses(w, mode, most_used(w, w.contact, s), s)) return false;
+        const Rearrangement found = rearrange(w, device, device, s);
         if (found == Rearrangement::none) open_pair(w, mode, device, s);
         return found != Rearrangement::stands;
     } else {

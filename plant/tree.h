@@ -137,6 +137,13 @@ void place_tree(const ModelData& model, TreeMode& tree, double* doubles, int* in
 // Fills mode.tree and what a mode says about itself (rows, bound, redundant) from mode.key.
 void build_tree_mode(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
 
+// Parts of that. Is the rigid device of this edge closed in the mode? Gears always are.
+bool is_active(const ModelData& model, const Mode& mode, const TreeTopology::Edge& edge) SHIFTRIG_REALTIME;
+// What holds a group: closed pairs to the housing; failing that, a stuck mesh.
+void find_grounds(const ModelData& model, Mode& mode, TreeMode& tree) SHIFTRIG_REALTIME;
+// S = Ĉ W Ĉᵀ of the grounded groups.
+void factor_network(const ModelData& model, TreeMode& tree) SHIFTRIG_REALTIME;
+
 // L D Lᵀ of M + hγ D' + (hγ)² K' for the weight hγ: 1/D and L by group.
 void factor_stage(const TreeMode& tree, double weight, double* inverse, double* lower) SHIFTRIG_REALTIME;
 

@@ -51,11 +51,6 @@ void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers,
 
 namespace {
 
-// Is the rigid device of this edge closed in the mode? Gears always are.
-bool is_active(const ModelData& m, const Mode& mode, const TreeTopology::Edge& edge) {
-    return edge.rigid >= m.pairs || (edge.rigid >= 0 && mode.key[edge.rigid] != 0);
-}
-
 // Groups in order of their first positions, kinematic ratios along them.
 void find_groups(const ModelData& m, const Mode& mode, TreeMode& t) {
     int groups = 0;
@@ -77,47 +72,6 @@ void find_groups(const ModelData& m, const Mode& mode, TreeMode& t) {
         t.grounded[g] = 0;
     }
     t.paths.groups = groups;
-}
-
-// What holds a group: closed pairs to the housing; failing that, a stuck mesh.
-void find_grounds(const ModelData& m, Mode& mode, TreeMode& t) {
-    const TreeTopology& topology = *m.tree;
-    t.ground_count = 0;
-    mode.redundant = false;
-    const auto hold = [&](int position, int unknown, double factor) {
-        t.ground_position[t.ground_count] = position;
-        t.ground_unknown[t.ground_count] = unknown;
-        t.ground_factor[t.ground_count++] = factor;
-    };
-    for (const TreeTopology::Ground& ground : topology.grounds) {
-        if (!mode.key[ground.pair]) continue;
-        unsigned char& grounded = t.grounded[t.group[ground.position]];
-        mode.redundant = mode.redundant || grounded != 0;
-        grounded = 1;
-        hold(ground.position, ground.pair, ground.factor);
-    }
-    for (int k = 0; k < m.meshes; ++k) {
-        const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
-        const int g = t.group[topology.position[static_cast<std::size_t>(mesh.first)]];
-        mode.bound[m.pairs + k] = t.grounded[g] == 1;
-        if (!mesh.lossy() || mode.key[m.pairs + k] != 0 || t.grounded[g] != 0) continue;
-        t.grounded[g] = 2;
-        mode.rows[mode.row_count++] = m.pairs + m.meshes + k;
-        hold(topology.position[static_cast<std::size_t>(mesh.second)], m.pairs + m.meshes + k, mesh.ratio);
-    }
-    for (int k = 0; k < m.meshes; ++k) {
-        const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
-        if (t.grounded[t.group[topology.position[static_cast<std::size_t>(mesh.first)]]])
-            mode.bound[m.pairs + k] |= 2;
-    }
-    for (int k = 0; k < m.pairs; ++k) {
-        bool held = true;
-        for (const Link& link : m.structure.pairs[static_cast<std::size_t>(k)].links) {
-            if (link.mass >= 0)
-                held = held && t.grounded[t.group[topology.position[static_cast<std::size_t>(link.mass)]]];
-        }
-        mode.bound[k] = held || mode.key[k];
-    }
 }
 
 // Force ratios, group masses, links to the parents.
@@ -143,7 +97,7 @@ void weigh_groups(const ModelData& m, const Mode& mode, TreeMode& t) {
                 const int k = edge.rigid - m.pairs;
                 const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
                 const unsigned char key = mode.key[edge.rigid];
-                const double u = mesh.force_ratio(mode.bound[edge.rigid] || key == 0 ? 0 : key == 2 ? -1 : 1);
+                const double u = mesh.force_ratio(key == 0 ? 0 : key == 2 ? -1 : 1);
                 const bool first = topology.mass[i] == mesh.first;
                 own = first ? 1 : -u;
                 up = first ? -u : 1;
@@ -160,38 +114,6 @@ void weigh_groups(const ModelData& m, const Mode& mode, TreeMode& t) {
         t.drag_loss[g] += t.ratio[p] * t.ratio[p] * topology.ground_damping[i];
     }
     for (int g = 0; g < groups; ++g) t.inverse_mass[g] = t.grounded[g] ? 0 : 1 / t.mass[g];
-}
-
-// S = Ĉ W Ĉᵀ of the grounded groups.
-void factor_network(const ModelData& m, TreeMode& t) {
-    const TreeTopology& topology = *m.tree;
-    double* diagonal = t.network_inverse;
-    std::fill(diagonal, diagonal + m.masses, 0.);
-    for (int i = 0; i < t.ground_count; ++i) {
-        diagonal[t.ground_position[i]] += topology.weight[static_cast<std::size_t>(t.ground_unknown[i])] *
-                                          t.ground_factor[i] * t.ground_factor[i];
-    }
-    const auto weight = [&](int e) {
-        return topology
-            .weight[static_cast<std::size_t>(topology.edges[static_cast<std::size_t>(t.edge[e])].rigid)];
-    };
-    for (int e = 0; e < t.edge_count; ++e) {
-        const int p = t.edge[e];
-        if (!t.grounded[t.group[p]]) continue;
-        diagonal[p] += weight(e) * t.edge_own[e] * t.edge_own[e];
-        diagonal[topology.edges[static_cast<std::size_t>(p)].parent] +=
-            weight(e) * t.edge_up[e] * t.edge_up[e];
-    }
-    for (int e = 0; e < t.edge_count; ++e) {  // children first
-        const int p = t.edge[e];
-        if (!t.grounded[t.group[p]]) continue;
-        const double coupling = weight(e) * t.edge_own[e] * t.edge_up[e];
-        t.network_lower[p] = coupling / diagonal[p];
-        diagonal[topology.edges[static_cast<std::size_t>(p)].parent] -= coupling * t.network_lower[p];
-    }
-    for (int p = 0; p < m.masses; ++p) {
-        if (t.grounded[t.group[p]]) t.network_inverse[p] = 1 / diagonal[p];
-    }
 }
 
 // Paths of groups whose parent is the group before them.

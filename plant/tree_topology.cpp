@@ -206,6 +206,7 @@ class Builder {
         const auto read = [&](int mass) {
             t.read_by_laws[static_cast<std::size_t>(t.position[static_cast<std::size_t>(mass)])] = 1;
         };
+        read(0);  // stands for the housing in ModelData's links, with the factor 0
         for (std::size_t j = 0; j < near_.size(); ++j) {
             if (model_.external_force[j] >= 0) read(static_cast<int>(j));
         }

@@ -242,7 +242,7 @@ double tree_family(const Work& w, const Mode& mode, int leader, signed char* par
     }
     for (int k = 0; k < m.meshes; ++k) {
         const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
-        const bool candidate = mesh.lossy() && w.contact[m.pairs + k] == stuck;
+        const bool candidate = mesh.lossy() && (w.contact[m.pairs + k] == stuck || mode.bound[m.pairs + k]);
         part[m.pairs + k] = candidate ? relation(mesh.motion()) : static_cast<signed char>(0);
     }
     return std::fabs(direction) / std::sqrt(inertia);

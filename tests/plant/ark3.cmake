@@ -1,4 +1,4 @@
-add_executable(ark3_test ${CMAKE_CURRENT_LIST_DIR}/ark3_test.cpp)
+add_executable(ark3_test ${CMAKE_CURRENT_LIST_DIR}/ark3_test.cpp ${CMAKE_CURRENT_LIST_DIR}/random_forests.cpp)
 target_link_libraries(ark3_test PRIVATE shiftrig_plant GTest::gtest_main)
 target_compile_definitions(ark3_test PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
 gtest_discover_tests(ark3_test)

@@ -1,79 +1,14 @@
 // The engine for long chains against the dense one: the same torques and rates at an instant to rounding, the same
 // motion to the order of the methods, on random forests of shafts, dampers, clutches, brakes and lossy gears.
 #include <algorithm>
-#include <random>
-#include <set>
+#include <cstdlib>
+#include <numbers>
 
 #include "rig.h"
+#include "tests/plant/random_forests.h"
 
 namespace shiftrig::plant {
 namespace {
-
-Gear lossy_gear(const std::string& name, const std::string& a, const std::string& b, double ratio,
-                double efficiency, double bearing) {
-    Gear gear;
-    gear.name = name;
-    gear.a = a;
-    gear.b = b;
-    gear.ratio = ratio;
-    gear.efficiency = efficiency;
-    gear.bearing_torque = bearing;
-    return gear;
-}
-
-// Every number is drawn in a statement of its own: the same machines with every compiler.
-struct Forest {
-    explicit Forest(std::uint64_t seed) : random(seed) {}
-    std::mt19937_64 random;
-    double real(double a, double b) { return a + (b - a) * static_cast<double>(random() >> 11) * 0x1p-53; }
-    int below(int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); }
-
-    Description build(bool losses) {
-        Description d;
-        d.name = "forest";
-        const int n = 3 + below(12);
-        for (int j = 0; j < n; ++j) {
-            d.masses.push_back(mass("m" + std::to_string(j), std::pow(10, real(-1, 1)), 0));
-            if (j == 0) continue;
-            const int parent = real(0, 1) < 0.6 ? j - 1 : below(j);
-            const std::string a = "m" + std::to_string(parent), b = "m" + std::to_string(j), name = "d" + b;
-            const bool turned = below(2) == 1;
-            const std::string &first = turned ? b : a, &second = turned ? a : b;
-            const double kind = real(0, 1);
-            if (kind < 0.4) {
-                d.shafts.push_back({name, first, second, real(100, 3000), real(0, 5), 0});
-                if (below(4) == 0) d.dampers.push_back({name + "d", second, first, real(0.1, 2)});
-            } else if (kind < 0.7) {
-                const double f = real(0.3, 1.5), phase = real(0, 1);
-                const double static_ratio = 1 + below(2) * 0.15, capacity = real(20, 200);
-                d.clutches.push_back(clutch(name, first, second, capacity, static_ratio,
-                                            ActuationDirect{sine(1, f, -1e300, 1e300, phase), 0}));
-            } else if (kind < 0.95) {
-                const double efficiency = losses ? real(0.6, 1) : 1;
-                const double bearing = losses && below(3) == 0 ? real(0.1, 2) : 0;
-                const double sign = below(3) == 0 ? -1 : 1, ratio = sign * real(0.4, 2.5);
-                d.gears.push_back(lossy_gear(name, first, second, ratio, efficiency, bearing));
-            } else {
-                d.dampers.push_back({name, first, second, real(0.5, 5)});
-            }
-        }
-        for (int j = 0; j < n; ++j) {
-            const std::string name = "m" + std::to_string(j);
-            if (below(4) == 0) {
-                const double phase = real(0, 1), f = real(0.3, 1.5), capacity = real(20, 100);
-                d.clutches.push_back(clutch("b" + name, name, "", capacity, 1.1,
-                                            ActuationDirect{sine(1, f, -1e300, 1e300, phase), 0}));
-            }
-            if (below(3) == 0) {
-                const double phase = real(0, 1), f = real(0.5, 4), amplitude = real(20, 150);
-                d.sources.push_back(source(name, sine(amplitude, f, -1e300, 1e300, phase)));
-            }
-            if (below(6) == 0) d.dampers.push_back({"g" + name, name, "", real(0.01, 1)});
-        }
-        if (d.sources.empty()) d.sources.push_back(source("m0", sine(100, 2)));
-        return d;
-    }
-};
 
 Description with(Description d, Method method) {
     d.method = method;
@@ -122,8 +57,19 @@ struct Agreement {
     std::string worst;
 };
 
-void compare_runs(bool losses, int seeds, double tolerance, Agreement& result) {
-    for (int seed = 1; seed <= seeds; ++seed) {
+// The first so many, or as many as SHIFTRIG_FORESTS says, and some more.
+std::vector<int> forests(int count, const std::vector<int>& more) {
+    if (const char* asked = std::getenv("SHIFTRIG_FORESTS")) count = std::atoi(asked);
+    std::vector<int> seeds;
+    for (int seed = 1; seed <= count; ++seed) seeds.push_back(seed);
+    for (const int seed : more) {
+        if (seed > count) seeds.push_back(seed);
+    }
+    return seeds;
+}
+
+void compare_runs(bool losses, const std::vector<int>& seeds, double tolerance, Agreement& result) {
+    for (const int seed : seeds) {
         const Description d = Forest(static_cast<std::uint64_t>(seed) + 1000).build(losses);
         const BuildOptions options{1e-4, KernelKind::automatic};
         Rig dense(with(d, Method::etd3), options), tree(with(d, Method::ark3), options);
@@ -153,14 +99,54 @@ void compare_runs(bool losses, int seeds, double tolerance, Agreement& result) {
 
 TEST(Ark3, RunsOfRandomForestsAgreeWithTheDenseEngine) {
     Agreement result;
-    compare_runs(false, 60, 1e-5, result);
+    compare_runs(false, forests(100, {507}), 1e-5, result);
     EXPECT_EQ(result.differ, 0) << result.worst;
 }
 
+// Behind the first hundred: those in which trains at rest have to share out their loads anew. In most a mesh takes part
+// of what is too much for a brake; in 194, 222, 388, 507 and 571 pairs and meshes hand it on to one another; in 777 no
+// loss directions agree with some of the splits.
 TEST(Ark3, RunsWithLossyGearsAgreeWithTheDenseEngine) {
     Agreement result;
-    compare_runs(true, 60, 1e-4, result);
+    compare_runs(true,
+                 forests(100, {114, 125, 170, 194, 216, 222, 388, 418, 433, 477, 507, 516, 543, 571, 777}),
+                 1e-4, result);
     EXPECT_EQ(result.differ, 0) << result.worst;
+}
+
+// A train of gears before a brake of 10 Nm, under a torque T = 20 sin 2πt: what its meshes lose at most, 10 %, 20 % …, the brake
+// need not hold. It gives way at T ∏η = 10.
+TEST(Ark3, BrakeBehindATrainHoldsWhatItsMeshesLeave) {
+    for (const int gears : {1, 2, 3}) {
+        Description d;
+        d.name = "train";
+        d.masses = {mass("m0", 1)};
+        double left = 1;
+        for (int j = 1; j <= gears; ++j) {
+            const std::string a = "m" + std::to_string(j - 1), b = "m" + std::to_string(j);
+            d.masses.push_back(mass(b, 1));
+            d.gears.push_back(lossy_gear("g" + b, a, b, j % 2 == 0 ? -1 : 1, 1 - 0.1 * j, 0));
+            left *= 1 - 0.1 * j;
+        }
+        d.clutches = {clutch("brake", d.masses.back().name, "", 10)};
+        d.clutches[0].initially_locked = true;
+        d.sources = {source("m0", sine(20, 1))};
+        for (const Method method : {Method::etd3, Method::ark3}) {
+            Rig rig(with(d, method));
+            rig.run(0.24);
+            const std::vector<double> opened = rig.times(EventKind::break_away, "brake");
+            ASSERT_EQ(opened.size(), 1u) << gears << ' ' << rig.model.engine();
+            const double due = std::asin(10 / left / 20) / (2 * std::numbers::pi);
+            EXPECT_NEAR(opened[0], due, 1e-6) << gears << ' ' << rig.model.engine();
+            // From there on T ∏η − 10 drives the masses, each by way of the meshes between it and the brake.
+            double inertia = 1, share = 1;
+            for (int j = gears; j > 0; --j) inertia += share *= 1 - 0.1 * j;
+            const double turn = 2 * std::numbers::pi, t = rig.state.time();
+            const double impulse =
+                20 * left / turn * (std::cos(turn * due) - std::cos(turn * t)) - 10 * (t - due);
+            EXPECT_NEAR(rig.state.speeds()[0], impulse / inertia, 1e-7) << gears << ' ' << rig.model.engine();
+        }
+    }
 }
 
 // Engine lag and boost, tyre slip, resistances and a converted wheel: what goes with the explicit table.
@@ -364,16 +350,18 @@ TEST(Ark3, DampsASwingByTheFifthPowerOfItsTurnAndNeverFeedsIt) {
 }
 
 TEST(Ark3, ScratchHoldsNothingThatSurvivesAStep) {
-    Description d = Forest(77).build(true);
-    d.method = Method::ark3;
-    Rig plain(d), dirty(d);
-    for (int i = 0; i < 500; ++i) {
-        plain.step();
-        dirty.scratch.fill_with_nan();
-        dirty.operators.drop();
-        dirty.step();
+    for (std::uint64_t seed = 1001; seed <= 1060; ++seed) {
+        Description d = Forest(seed).build(seed % 4 != 0);
+        d.method = Method::ark3;
+        Rig plain(d), dirty(d);
+        for (int i = 0; i < 300; ++i) {
+            plain.step();
+            dirty.scratch.fill_with_nan();
+            dirty.operators.drop();
+            dirty.step();
+        }
+        EXPECT_TRUE(std::ranges::equal(plain.state.bytes(), dirty.state.bytes())) << "forest " << seed;
     }
-    EXPECT_TRUE(std::ranges::equal(plain.state.bytes(), dirty.state.bytes()));
 }
 
 }  // namespace

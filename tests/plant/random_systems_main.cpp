@@ -10,10 +10,25 @@
 #include <vector>
 
 #include "tests/plant/comparison.h"
+#include "tests/plant/random_forests.h"
 
 namespace {
 
 using namespace shiftrig;
+
+// Those of ark3_test, which counts them from 1001.
+RandomSystem forest(std::uint64_t seed, bool losses) {
+    RandomSystem system;
+    system.description = plant::Forest(seed + 1000).build(losses);
+    system.traits = "n=" + std::to_string(system.description.masses.size());
+    return system;
+}
+RandomSystem random_forest(std::uint64_t seed, double) {
+    return forest(seed, false);
+}
+RandomSystem random_lossy_forest(std::uint64_t seed, double) {
+    return forest(seed, true);
+}
 
 struct Arguments {
     long count = 100, jobs = 1;
@@ -21,16 +36,17 @@ struct Arguments {
     std::vector<std::uint64_t> seeds;  // instead of count and seed
     ComparisonOptions options;
     RandomSystem (*make)(std::uint64_t, double) = random_system;
+    plant::Method method = plant::Method::automatic;
     bool verbose = false;
 };
 
 const char usage[] =
     "usage: shiftrig_random_systems [--count N] [--seed S | --seeds A,B,…] [--seconds T] [--jobs J] "
     "[--substeps K] "
-    "[--kind plain|freewheels|backlashes|tables] [--verbose]\n"
+    "[--kind plain|freewheels|backlashes|tables|forests|lossy_forests] [--method etd3|ark3] [--verbose]
+    "
     "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --verbose prints each "
-    "that does "
-    "not agree\n";
+    "that does not agree\n";
 
 std::vector<std::uint64_t> numbers(const char* list) {
     std::vector<std::uint64_t> found;
@@ -59,6 +75,10 @@ bool parse(int argc, char** argv, Arguments& a) {
             a.options.steps_per_sample = std::atoi(value);
         else if (key == "--jobs")
             a.jobs = std::atol(value);
+        else if (key == "--method" && value == std::string("etd3"))
+            a.method = plant::Method::etd3;
+        else if (key == "--method" && value == std::string("ark3"))
+            a.method = plant::Method::ark3;
         else if (key == "--kind" && value == std::string("plain"))
             a.make = random_system;
         else if (key == "--kind" && value == std::string("freewheels"))
@@ -67,6 +87,10 @@ bool parse(int argc, char** argv, Arguments& a) {
             a.make = random_system_with_backlashes;
         else if (key == "--kind" && value == std::string("tables"))
             a.make = random_system_with_friction_tables;
+        else if (key == "--kind" && value == std::string("forests"))
+            a.make = random_forest;
+        else if (key == "--kind" && value == std::string("lossy_forests"))
+            a.make = random_lossy_forest;
         else
             return false;
     }
@@ -92,7 +116,8 @@ int main(int argc, char** argv) {
             const std::uint64_t seed = arguments.seeds.empty()
                                            ? arguments.seed + static_cast<std::uint64_t>(i)
                                            : arguments.seeds[static_cast<std::size_t>(i)];
-            const RandomSystem system = arguments.make(seed, arguments.options.seconds);
+            RandomSystem system = arguments.make(seed, arguments.options.seconds);
+            system.description.method = arguments.method;
             Comparison c;
             try {
                 c = compare(system, seed, arguments.options);

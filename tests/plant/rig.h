@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "plant/plant.h"
+#include "tests/plant/parts.h"
 
 namespace shiftrig::plant {
 
@@ -79,51 +80,6 @@ inline std::map<std::string, std::vector<double>> read_reference(const std::stri
             columns[header[i]].push_back(std::stod(cell));
     }
     return columns;
-}
-
-inline Mass mass(const std::string& name, double inertia, double speed = 0) {
-    return {name, inertia, Motion::rotating, speed};
-}
-
-inline Clutch clutch(const std::string& name, const std::string& a, const std::string& b, double capacity,
-                     double static_ratio = 1, Actuation actuation = ActuationConstant{}) {
-    Clutch c;
-    c.name = name;
-    c.a = a;
-    c.b = b;
-    DryFriction friction;
-    friction.sliding_capacity = capacity;
-    friction.static_ratio = static_ratio;
-    c.friction = friction;
-    c.actuation = std::move(actuation);
-    return c;
-}
-
-inline TorqueSource source(const std::string& mass, Waveform waveform) {
-    TorqueSource s;
-    s.name = mass + "_torque";
-    s.mass = mass;
-    s.waveform = std::move(waveform);
-    return s;
-}
-
-inline Waveform constant(double value, double from = -1e300, double until = 1e300) {
-    Waveform::Piece piece;
-    piece.from = from;
-    piece.until = until;
-    piece.offset = value;
-    return {{piece}};
-}
-
-inline Waveform sine(double amplitude, double frequency, double from = -1e300, double until = 1e300,
-                     double phase_time = 0) {
-    Waveform::Piece piece;
-    piece.from = from;
-    piece.until = until;
-    piece.amplitude = amplitude;
-    piece.frequency = frequency;
-    piece.phase_time = phase_time;
-    return {{piece}};
 }
 
 }  // namespace shiftrig::plant
