@@ -134,6 +134,7 @@ void build_pair_laws(ModelBuilder& builder) {
         PairLaw& law = builder.law(k);
         if (law.heat) law.temperature = heated++;
         law.sliding_at_rest = sliding_factor(law.friction, 0);
+        if (law.friction.factor_over_slip != nullptr) m.tabled_pairs.push_back(k);
         if (law.source == LoadSource::waveform) m.depends_on_time = true;
         if (law.hydraulic) m.hydraulic_pairs.push_back(k);
         if (law.source == LoadSource::release || law.source == LoadSource::apply) m.pedal_pairs.push_back(k);
@@ -226,7 +227,7 @@ void divide_step(ModelData& m, double reach, int most) {
 // A contact of flanks can be as short as half a period of the lightest motion they allow. The parts of a step have to
 // see it, and its events have to have room. Forces that swing with it (a load that grows with speed) cost a part of turn
 // ωh a phase of order (ωh)⁴, which hundreds of contacts add up: half a radian, not one. Friction that rises with speed is
-// a damper that the step does not take exactly: its parts must not be longer than its time constant.
+// a damper that the step does not take exactly: its parts are to be short against its time constant.
 void bound_step(ModelData& m) {
     constexpr int most_for_flanks = 1 << 14, most_for_friction = 256;
     m.maximum_events = m.description.maximum_events;
@@ -235,7 +236,7 @@ void bound_step(ModelData& m) {
         const PairLaw& law = m.pair_laws[static_cast<std::size_t>(k)];
         const double rate = law.full_load * steepest_rise(law.friction) *
                             mobility_between(m, m.structure.pairs[static_cast<std::size_t>(k)].links);
-        divide_step(m, rate * m.options.step_size, most_for_friction);
+        divide_step(m, 4 * rate * m.options.step_size, most_for_friction);
     }
     for (const BacklashLaw& law : m.backlashes) {
         const double mobility =

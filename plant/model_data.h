@@ -151,6 +151,7 @@ struct ModelData {
         first_pair{};                // by place in the list of connectors.h: pairs of one kind stand side
                                      // by side, in the order of the description; −1: none
     std::vector<int> one_way_pairs;  // those with a weak sense
+    std::vector<int> tabled_pairs;   // whose friction factor is a table
     std::vector<BacklashLaw> backlashes;
     std::vector<int> hydraulic_pairs, pedal_pairs, waveform_pairs;  // by what actuates them
     std::vector<int> heated_pairs;

@@ -62,4 +62,27 @@ bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     return hidden > swing_tolerance * size;
 }
 
+double first_knot(const Work& w) SHIFTRIG_REALTIME {
+    constexpr double edge = 1e-3;  // nearer to an end of the part than this is there
+    double first = 1;
+    for (const int k : w.model.tabled_pairs) {
+        if (!slips(w.contact[k])) continue;
+        const double s0 = std::fabs(w.scratch.begin.slip[k]), sm = std::fabs(w.scratch.half.slip[k]),
+                     s1 = std::fabs(w.scratch.end.slip[k]);
+        for (const auto& [knot, factor] :
+             *w.model.pair_laws[static_cast<std::size_t>(k)].friction.factor_over_slip) {
+            if ((knot - s0) * (knot - s1) >= 0) continue;
+            // On the parabola through the three, from the straight line.
+            const double a = 2 * (s0 - 2 * sm + s1), b = 4 * sm - 3 * s0 - s1;
+            double theta = (knot - s0) / (s1 - s0);
+            for (int i = 0; i < 2; ++i) {
+                const double slope = b + 2 * a * theta;
+                if (slope != 0) theta -= (s0 + theta * (b + theta * a) - knot) / slope;
+            }
+            if (theta > edge && theta < 1 - edge) first = std::min(first, theta);
+        }
+    }
+    return first;
+}
+
 }  // namespace shiftrig::plant::detail

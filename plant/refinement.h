@@ -10,4 +10,8 @@ namespace shiftrig::plant::detail {
 // is not, nor are forces taken from the stages.
 bool is_coarse(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
+// Where between begin and end the first slip comes upon a knot of its friction table, beyond which the part's few samples
+// would see another slope. 1: nowhere.
+double first_knot(const Work& work) SHIFTRIG_REALTIME;
+
 }  // namespace shiftrig::plant::detail

@@ -167,7 +167,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
             integrate(w, *mode, until);
         }
         if (localise && dips > 0) {
-            const double theta = first_dip(w, *mode);
+            const double theta = std::min(first_dip(w, *mode), first_knot(w));
             if (theta < 1) {
                 --dips;
                 until = done + theta * (until - done);

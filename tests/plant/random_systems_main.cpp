@@ -43,8 +43,8 @@ struct Arguments {
 const char usage[] =
     "usage: shiftrig_random_systems [--count N] [--seed S | --seeds A,B,…] [--seconds T] [--jobs J] "
     "[--substeps K] "
-    "[--kind plain|freewheels|backlashes|tables|forests|lossy_forests] [--method etd3|ark3] [--verbose]
-    "
+    "[--kind plain|freewheels|backlashes|tables|forests|lossy_forests] [--method etd3|ark3] "
+    "[--verbose]\n"
     "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --verbose prints each "
     "that does not agree\n";
 
