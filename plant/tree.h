@@ -80,6 +80,8 @@ struct TreeMode {
     int* up = nullptr;
     int* path_begin = nullptr;
     int* path_parent = nullptr;
+    int* run_begin = nullptr;
+    int* run_parent = nullptr;
     unsigned char* grounded = nullptr;  // 1: held by a closed pair, 2: by a stuck mesh
     double* mass = nullptr;             // M
     double* inverse_mass = nullptr;     // 1/M, 0 where grounded

@@ -15,7 +15,11 @@ struct TreePaths {
     const int* begin = nullptr;   // of each path, and `groups` at the end
     const int* parent = nullptr;  // group that the head hangs on, −1: none
     const int* up = nullptr;      // parent of every group; roots, with L = 0, name group 0
-    bool long_paths = false;      // worth following; short ones run into each other by themselves
+    // Paths with the roots behind them, whose L of 0 ends no chain of operations: what the solutions follow. The same fields.
+    int run_count = 0;
+    const int* run_begin = nullptr;
+    const int* run_parent = nullptr;
+    bool long_runs = false;  // worth following; short ones run into each other by themselves
     const double* mass = nullptr;
     const double* inverse_mass = nullptr;  // 0 where grounded
     const double* drag = nullptr;

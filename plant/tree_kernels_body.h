@@ -72,20 +72,20 @@ void stage_start(const TreePaths& t, const StageSums& s, const double* __restric
 // Leaves towards roots: b of the parent += L b. Two neighbouring paths run side by side, since each is a chain of
 // dependent operations: the later one must be done before the earlier one passes the group it hangs on.
 inline void eliminate(const TreePaths& t, const double* __restrict lower, double* __restrict right) noexcept {
-    if (!t.long_paths) {
+    if (!t.long_runs) {
         for (int g = t.groups - 1; g > 0; --g) {
             right[t.up[g]] = SHIFTRIG_FMA(lower[g], right[g], right[t.up[g]]);
         }
         return;
     }
-    int p = t.count - 1;
+    int p = t.run_count - 1;
     while (p >= 0) {
-        const int b_begin = t.begin[p], b_end = t.begin[p + 1];
+        const int b_begin = t.run_begin[p], b_end = t.run_begin[p + 1];
         int b = b_end - 1;
         double rb = right[b];
         if (p > 0) {
-            const int a_begin = t.begin[p - 1];
-            const int stop = t.parent[p] > a_begin ? t.parent[p] : a_begin;
+            const int a_begin = t.run_begin[p - 1];
+            const int stop = t.run_parent[p] > a_begin ? t.run_parent[p] : a_begin;
             int a = b_begin - 1;
             double ra = right[a];
             int common = b - b_begin < a - stop ? b - b_begin : a - stop;
@@ -107,21 +107,21 @@ inline void eliminate(const TreePaths& t, const double* __restrict lower, double
                 rb = SHIFTRIG_FMA(lower[b], rb, right[b - 1]);
                 right[--b] = rb;
             }
-            if (t.parent[p] >= 0) right[t.parent[p]] = SHIFTRIG_FMA(lower[b], rb, right[t.parent[p]]);
+            if (t.run_parent[p] >= 0) right[t.run_parent[p]] = SHIFTRIG_FMA(lower[b], rb, right[t.run_parent[p]]);
             ra = right[a];
             while (a > a_begin) {
                 ra = SHIFTRIG_FMA(lower[a], ra, right[a - 1]);
                 right[--a] = ra;
             }
-            if (t.parent[p - 1] >= 0)
-                right[t.parent[p - 1]] = SHIFTRIG_FMA(lower[a], ra, right[t.parent[p - 1]]);
+            if (t.run_parent[p - 1] >= 0)
+                right[t.run_parent[p - 1]] = SHIFTRIG_FMA(lower[a], ra, right[t.run_parent[p - 1]]);
             p -= 2;
         } else {
             while (b > b_begin) {
                 rb = SHIFTRIG_FMA(lower[b], rb, right[b - 1]);
                 right[--b] = rb;
             }
-            if (t.parent[p] >= 0) right[t.parent[p]] = SHIFTRIG_FMA(lower[b], rb, right[t.parent[p]]);
+            if (t.run_parent[p] >= 0) right[t.run_parent[p]] = SHIFTRIG_FMA(lower[b], rb, right[t.run_parent[p]]);
             p -= 1;
         }
     }
@@ -130,27 +130,27 @@ inline void eliminate(const TreePaths& t, const double* __restrict lower, double
 // Roots towards leaves: q = b/D + L q of the parent; `speed` comes in as b/D.
 inline void substitute(const TreePaths& t, const double* __restrict lower,
                        double* __restrict speed) noexcept {
-    if (!t.long_paths) {
+    if (!t.long_runs) {
         for (int g = 1; g < t.groups; ++g) speed[g] = SHIFTRIG_FMA(lower[g], speed[t.up[g]], speed[g]);
         return;
     }
     int p = 0;
     const auto head = [&](int path) {
-        const int g = t.begin[path], up = t.parent[path];
+        const int g = t.run_begin[path], up = t.run_parent[path];
         if (up >= 0) speed[g] = SHIFTRIG_FMA(lower[g], speed[up], speed[g]);
         return speed[g];
     };
-    while (p < t.count) {
-        const int a_end = t.begin[p + 1];
+    while (p < t.run_count) {
+        const int a_end = t.run_begin[p + 1];
         double qa = head(p);
-        int a = t.begin[p] + 1;
-        if (p + 1 < t.count) {
-            const int up = t.parent[p + 1];
+        int a = t.run_begin[p] + 1;
+        if (p + 1 < t.run_count) {
+            const int up = t.run_parent[p + 1];
             while (a <= up && a < a_end) {
                 qa = SHIFTRIG_FMA(lower[a], qa, speed[a]);
                 speed[a++] = qa;
             }
-            const int b_end = t.begin[p + 2];
+            const int b_end = t.run_begin[p + 2];
             double qb = head(p + 1);
             int b = a_end + 1;
             int common = a_end - a < b_end - b ? a_end - a : b_end - b;

@@ -14,7 +14,7 @@ TreeSizes::TreeSizes(const ModelData& m) {
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
     const auto forces = static_cast<std::size_t>(m.forces);
     doubles = 20 * n + grounds + 2 * forces;
-    integers = 13 * n + 2 * grounds + 3 * forces;
+    integers = 15 * n + 2 * grounds + 3 * forces;
     bytes = (n + 7) / 8 * 8;
     masses = 2 * n;
 }
@@ -32,8 +32,8 @@ void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers,
     }
     t.end_factor = doubles;  // two ends of every link
     t.ground_factor = t.end_factor + 2 * n;
-    for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.speed_slot,
-                        &t.twist_slot, &t.up}) {
+    for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.run_begin,
+                        &t.run_parent, &t.speed_slot, &t.twist_slot, &t.up}) {
         *array = integers;
         integers += n;
     }
@@ -119,16 +119,23 @@ void weigh_groups(const ModelData& m, const Mode& mode, TreeMode& t) {
 // Paths of groups whose parent is the group before them.
 void find_paths(TreeMode& t) {
     TreePaths& paths = t.paths;
-    paths.count = 0;
+    paths.count = paths.run_count = 0;
     for (int g = 0; g < paths.groups; ++g) {
         if (g > 0 && t.parent[g] == g - 1) continue;
+        if (g == 0 || t.parent[g] >= 0) {
+            t.run_begin[paths.run_count] = g;
+            t.run_parent[paths.run_count++] = t.parent[g];
+        }
         t.path_begin[paths.count] = g;
         t.path_parent[paths.count++] = t.parent[g];
     }
     t.path_begin[paths.count] = paths.groups;
+    t.run_begin[paths.run_count] = paths.groups;
     for (int g = 0; g < paths.groups; ++g) t.up[g] = t.parent[g] < 0 ? 0 : t.parent[g];
     paths.up = t.up;
-    paths.long_paths = paths.groups > 12 * paths.count;
+    paths.run_begin = t.run_begin;
+    paths.run_parent = t.run_parent;
+    paths.long_runs = paths.groups > 12 * paths.run_count;
     paths.begin = t.path_begin;
     paths.parent = t.path_parent;
     paths.mass = t.mass;
