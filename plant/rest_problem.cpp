@@ -202,7 +202,7 @@ bool pose_rest_problem(Work& w, const Mode& mode, int around, Sample& s,
                        RestProblem& rest) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     place(m, rest, w.scratch.standstill.data());
-    const Piece piece = piece_around(w, mode, around, s);
+    const Piece piece = rest.piece = piece_around(w, mode, around, s);
     if (!list_joints(w, mode, s, piece, rest) || rest.count == 0) return false;
     if (mode.tree && rest.count == 1) return false;  // it goes, or it does not: no need to solve for that
     unsigned char* const closed = w.scratch.trial.data();

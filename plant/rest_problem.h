@@ -18,6 +18,7 @@
 #pragma once
 
 #include "plant/forces.h"
+#include "plant/piece.h"
 
 namespace shiftrig::plant::detail {
 
@@ -46,6 +47,7 @@ struct TrainWork {
 };
 
 struct RestProblem {
+    Piece piece;
     RestJoint joints[most_joints];
     int count = 0, bends = 0;
     int mesh_rows = 0;  // of `mesh`: all meshes; on a tree those at rest
@@ -68,16 +70,6 @@ struct RestProblem {
 
 // Is the device at rest at the sample, by others' doing or by itself?
 bool is_still(const Work& work, const Mode& mode, int device, const Sample& sample) SHIFTRIG_REALTIME;
-
-// The devices that may take a load from one another. On a tree those that gears, locked pairs and pairs at rest join, held
-// in scratch.workspace_index; without one all of them.
-struct Piece {
-    const ModelData* model = nullptr;
-    const int* joined = nullptr;  // by position: the first position of its piece
-    int first = -1;               // of this one
-    bool holds(int device) const SHIFTRIG_REALTIME;
-};
-Piece piece_around(const Work& work, const Mode& mode, int device, const Sample& sample) SHIFTRIG_REALTIME;
 
 // Does the piece have more devices at rest than may be asked together?
 bool is_too_much(const Work& work, const Mode& mode, const Piece& piece,

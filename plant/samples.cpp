@@ -76,6 +76,7 @@ ScratchData::ScratchData(const ModelData& m) {
     workspace.assign(static_cast<std::size_t>(m.tree ? TreeWork::doubles(m) : workspace_doubles(m)), 0.);
     standstill.assign(static_cast<std::size_t>(rest_workspace(m)), 0.);
     workspace_index.assign(static_cast<std::size_t>(workspace_integers(m)), 0);
+    piece.assign(static_cast<std::size_t>(m.masses), 0);
     if (m.tree) return;
     for (auto* memory : {&operator_memory, &ledger_memory}) {
         *memory = aligned_doubles(static_cast<std::size_t>(ModeSizes(m).operators));

@@ -97,6 +97,7 @@ struct ScratchData {
     std::vector<double> workspace;   // of the mode builder
     std::vector<double> standstill;  // of rearrange(), which builds modes on its way
     std::vector<int> workspace_index;
+    std::vector<int> piece;  // per mass
     AlignedDoubles operator_memory, ledger_memory;  // operators of a partial step, of a part of one
     const Mode* begin_groups = nullptr;             // mode in which the tree's begin.groups hold for `begin`
     int told_events = 0;                            // so many of this step's events are told in full

@@ -88,10 +88,11 @@ Mode& find_directions(Work& w, unsigned char* contact, Sample& s, bool complete)
     }
 }
 
-Use most_used(const Work& w, const unsigned char* contact, const Sample& s) SHIFTRIG_REALTIME {
+Use most_used(const Work& w, const unsigned char* contact, const Sample& s,
+              const Piece& piece) SHIFTRIG_REALTIME {
     Use worst;
     for (int k = 0; k < w.model.pairs; ++k) {
-        if (contact[k] != locked) continue;
+        if (contact[k] != locked || !piece.holds(k)) continue;
         const double use = std::fabs(s.torque[k]) / static_limit(w, k, s);
         if (use > worst.share && (use <= overload || is_overloaded(w, k, s))) worst = {k, use};
     }
@@ -131,7 +132,7 @@ bool lean_on_losses(Work& w, const Mode& mode, const Use& most, Sample& s) SHIFT
             const Mode& leaning = find_directions(w, trial, s);
             const bool agrees = (w.outputs.certificate.flags & 2) == 0;  // else it is no split of the torques
             w.outputs.certificate.flags |= flags;
-            const double relieved = most_used(w, w.contact, s).share;
+            const double relieved = most_used(w, w.contact, s, piece).share;
             if (!agrees || !leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
             use = relieved;
             found = true;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "plant/devices.h"
+#include "plant/piece.h"
 #include "plant/transitions.h"
 
 namespace shiftrig::plant::detail {
@@ -12,12 +13,13 @@ namespace shiftrig::plant::detail {
 Mode& find_directions(Work& work, unsigned char* contact, Sample& sample,
                       bool complete = false) SHIFTRIG_REALTIME;
 
-// The locked pair that uses most of its static capacity.
+// The locked pair of the piece that uses most of its static capacity.
 struct Use {
     int pair = -1;
     double share = 0;  // torque over capacity
 };
-Use most_used(const Work& work, const unsigned char* contact, const Sample& sample) SHIFTRIG_REALTIME;
+Use most_used(const Work& work, const unsigned char* contact, const Sample& sample,
+              const Piece& piece = {}) SHIFTRIG_REALTIME;
 
 // The pair breaks away at the sample. Meshes that leaned on their losses begin anew: which way they go now,
 // release_drive() finds out.

@@ -28,22 +28,23 @@ void set_limits(const Work& w, const Sample& s, RestJoint& joint) {
     joint.lower = -limit(-1);
 }
 
-// Are these contact states a solution as well, with torques as their mode shares them out? Where nothing goes, no pair may
-// open that the others do not hold. Turns loss directions on the way.
-bool is_consistent(Work& w, unsigned char* contact, bool goes, Sample& s) {
+// Are these contact states a solution for the piece as well, with torques as their mode shares them out? Where nothing goes,
+// no pair may open that the others do not hold. Turns loss directions on the way.
+bool is_consistent(Work& w, const Piece& piece, unsigned char* contact, bool goes, Sample& s) {
     const ModelData& m = w.model;
     contact_forces(w, contact, s);
     const Mode& mode = find_directions(w, contact, s);
     const double size = torque_scale(w, s);
-    if (is_overloaded(w, most_used(w, contact, s).pair, s)) return false;
+    if (is_overloaded(w, most_used(w, contact, s, piece).pair, s)) return false;
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
-        if (loss_left(w, mode.rows[r] - m.pairs - m.meshes, s) < -1e-9 * size) return false;
+        const int mesh = mode.rows[r] - m.pairs - m.meshes;
+        if (piece.holds(m.pairs + mesh) && loss_left(w, mesh, s) < -1e-9 * size) return false;
     }
     sample_rate(w, mode, s);
     for (int k = 0; k < m.first_flank; ++k) {
         const unsigned char state = contact[k];
         const bool open = k < m.pairs ? slips(state) : state != stuck && mesh_of(w, k - m.pairs).lossy();
-        if (!open || mode.bound[k] || !is_still(w, mode, k, s)) continue;
+        if (!open || mode.bound[k] || !piece.holds(k) || !is_still(w, mode, k, s)) continue;
         if (!goes && k < m.pairs && w.contact[k] == locked) return false;
         const double sign = k < m.pairs ? slip_sign(state) : motion_sign(state);
         if (sign * device_slip(w, k, s.rate) < -1e-9 * slip_scale(w, k, s.rate)) return false;
@@ -110,7 +111,7 @@ struct Search {
         unsigned char* const trial = w.scratch.trial.data();
         std::copy(w.contact, w.contact + w.model.contact_bytes, trial);
         for (int i = 0; i < rest.count; ++i) trial[rest.joints[i].device] = state(i);
-        return is_consistent(w, trial, goes, s);
+        return is_consistent(w, rest.piece, trial, goes, s);
     }
     // As few changes as do, so that torques that are not unique stay nearly what they were.
     bool attempt_least() {

@@ -38,33 +38,7 @@ Factors force_factors(const Work& w, int position, const RestProblem& rest) {
     return {first ? 1 : -u, first ? -u : 1};
 }
 
-int first_position(const ModelData& m, int device) {
-    return position_of(m, device < m.pairs
-                              ? m.structure.pairs[static_cast<std::size_t>(device)].links[0].mass
-                              : m.structure.meshes[static_cast<std::size_t>(device - m.pairs)].first);
-}
-
 }  // namespace
-
-Piece piece_around(const Work& w, const Mode& mode, int device, const Sample& s) SHIFTRIG_REALTIME {
-    const ModelData& m = w.model;
-    if (!mode.tree || device < 0) return {};
-    int* const joined_to = w.scratch.workspace_index.data();
-    for (int p = 0; p < m.masses; ++p) {
-        const TreeTopology::Edge& edge = edge_of(m, p);
-        bool joined = edge.rigid >= m.pairs;
-        if (edge.rigid >= 0 && !joined) {
-            const unsigned char state = w.contact[edge.rigid];
-            joined = state == locked || (slips(state) && is_still(w, mode, edge.rigid, s));
-        }
-        joined_to[p] = joined ? joined_to[edge.parent] : p;
-    }
-    return {&m, joined_to, joined_to[first_position(m, device)]};
-}
-
-bool Piece::holds(int device) const SHIFTRIG_REALTIME {
-    return !joined || joined[first_position(*model, device)] == first;
-}
 
 bool set_up_trains(const Work& w, const Piece& piece, RestProblem& rest) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
