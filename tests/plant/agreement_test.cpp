@@ -235,6 +235,36 @@ TEST(RandomSystems, PowerTurnsWhereAClutchBeginsToPress) {
     EXPECT_LT(c.worst, 0.01);
 }
 
+// What locks, slips or gives way in one machine is nothing to another that stands beside it: both move as they do alone, but for
+// the instants at which the steps of both are cut. More than K changes in a step may fall back, and say so.
+TEST(RandomSystems, AMachineFeelsNothingOfAnotherBesideIt) {
+    constexpr double seconds = 0.2, tolerance = 1e-4;
+    for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+        Description a = random_system(seed, seconds).description,
+                    b = random_system(seed + 5000, seconds).description;
+        Description together = side_by_side(a, b);
+        a.method = b.method = together.method = Method::etd3;
+        Rig first(a), second(b), both(together);
+        const std::size_t alone = a.masses.size(), masses = together.masses.size();
+        std::vector<double> low(masses, 1e300), high(masses, -1e300), difference(masses, 0);
+        for (int k = 0; k < 200; ++k) {
+            for (Rig* rig : {&first, &second, &both}) rig->advance();
+            for (std::size_t j = 0; j < masses; ++j) {
+                const double speed = j < alone ? first.state.speeds()[j] : second.state.speeds()[j - alone];
+                low[j] = std::min(low[j], speed);
+                high[j] = std::max(high[j], speed);
+                difference[j] = std::max(difference[j], std::abs(both.state.speeds()[j] - speed));
+            }
+        }
+        double largest = 0;
+        for (std::size_t j = 0; j < masses; ++j) largest = std::max(largest, high[j] - low[j]);
+        for (std::size_t j = 0; j < masses; ++j) {
+            EXPECT_LE(difference[j], tolerance * std::max(high[j] - low[j], 1e-3 * largest))
+                << "seed " << seed << ", " << together.masses[j].name;
+        }
+    }
+}
+
 // Friction that rises over the slip damps, and light bodies are damped faster than a part of a step is long (25, 69).
 TEST(RandomSystems, WithFrictionTablesAgreeWithTheReferenceSolver) {
     const ComparisonOptions options;

@@ -424,6 +424,29 @@ RandomSystem random_system_with_friction_tables(std::uint64_t seed, double secon
     return system;
 }
 
+plant::Description side_by_side(plant::Description a, const plant::Description& b) {
+    const auto add = [](auto& to, const auto& from, const auto&... ends) {
+        for (auto device : from) {
+            device.name = "b." + device.name;
+            for (auto end : {ends...}) {
+                if (!(device.*end).empty()) device.*end = "b." + device.*end;
+            }
+            to.push_back(std::move(device));
+        }
+    };
+    for (Mass mass : b.masses) {
+        mass.name = "b." + mass.name;
+        a.masses.push_back(std::move(mass));
+    }
+    add(a.shafts, b.shafts, &Shaft::a, &Shaft::b);
+    add(a.dampers, b.dampers, &Damper::a, &Damper::b);
+    add(a.clutches, b.clutches, &Clutch::a, &Clutch::b);
+    add(a.gears, b.gears, &Gear::a, &Gear::b);
+    add(a.planetaries, b.planetaries, &Planetary::sun, &Planetary::ring, &Planetary::carrier);
+    add(a.sources, b.sources, &TorqueSource::mass);
+    return a;
+}
+
 double impulse(const Waveform& waveform, double until) {
     double sum = 0;
     for (const auto& p : waveform.pieces) {

@@ -29,6 +29,9 @@ RandomSystem random_system_with_backlashes(std::uint64_t seed, double seconds);
 // The same machines with friction factors from tables in some of their clutches: rising and falling over the slip, with kinks.
 RandomSystem random_system_with_friction_tables(std::uint64_t seed, double seconds);
 
+// Both machines in one description, joined by nothing; names of the second begin with "b.".
+plant::Description side_by_side(plant::Description a, const plant::Description& b);
+
 // ∫ waveform dt from 0 to `until`.
 double impulse(const plant::Waveform& waveform, double until);
 
