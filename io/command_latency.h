@@ -27,7 +27,10 @@ class CommandLatencies {
 
     // The loop: the next one not yet taken [ns]; false if there is none.
     SHIFTRIG_TRUSTED_BEGIN  // neither allocates nor locks
-    bool next(std::int64_t& latency_ns) SHIFTRIG_REALTIME { return latencies_.try_dequeue(latency_ns); }
+        bool
+        next(std::int64_t& latency_ns) SHIFTRIG_REALTIME {
+        return latencies_.try_dequeue(latency_ns);
+    }
     SHIFTRIG_TRUSTED_END
 
   private:

@@ -94,10 +94,10 @@ struct ScratchData {
     double* work = nullptr;  // per force in this step, what it takes out: of pairs, their heat [J]
     double dissipated = 0, input_work = 0;  // in this step [J]
     double stored_before = 0, stored = 0;   // at its beginning, at its end [J]
-    std::vector<double> workspace;   // of the mode builder
-    std::vector<double> standstill;  // of rearrange(), which builds modes on its way
+    std::vector<double> workspace;          // of the mode builder
+    std::vector<double> standstill;         // of rearrange(), which builds modes on its way
     std::vector<int> workspace_index;
-    std::vector<int> piece;  // per mass
+    std::vector<int> piece;                         // per mass
     AlignedDoubles operator_memory, ledger_memory;  // operators of a partial step, of a part of one
     const Mode* begin_groups = nullptr;             // mode in which the tree's begin.groups hold for `begin`
     int told_events = 0;                            // so many of this step's events are told in full

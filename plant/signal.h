@@ -11,21 +11,21 @@ namespace shiftrig::plant {
 
 // The units that occur; inside the plant everything is SI (temperatures in °C).
 enum class Unit {
-    one,               // dimensionless: ratios, slip, commands 0…1, counts, flags
-    radian,            // rad
-    radian_per_second, // rad/s
-    metre,             // m
-    metre_per_second,  // m/s
-    metre_per_second2, // m/s²
-    newton,            // N
-    newton_metre,      // Nm
-    pascal,            // Pa
-    ampere,            // A
-    joule,             // J
-    watt,              // W
-    celsius,           // °C
-    second,            // s
-    kilogram,          // kg
+    one,                // dimensionless: ratios, slip, commands 0…1, counts, flags
+    radian,             // rad
+    radian_per_second,  // rad/s
+    metre,              // m
+    metre_per_second,   // m/s
+    metre_per_second2,  // m/s²
+    newton,             // N
+    newton_metre,       // Nm
+    pascal,             // Pa
+    ampere,             // A
+    joule,              // J
+    watt,               // W
+    celsius,            // °C
+    second,             // s
+    kilogram,           // kg
 };
 
 // The suffix a name carries where it leaves the program (`_pa`, `_rad_s`); empty for dimensionless.
@@ -37,10 +37,10 @@ std::string_view symbol(Unit unit);
 struct Signal {
     std::string name;
     Unit unit = Unit::one;
-    double initial = 0;           // value before anyone sets it, in `unit`
-    double minimum = -1e300;      // inputs outside [minimum, maximum] are limited by the assembly, and counted
+    double initial = 0;       // value before anyone sets it, in `unit`
+    double minimum = -1e300;  // inputs outside [minimum, maximum] are limited by the assembly, and counted
     double maximum = 1e300;
-    std::string description;      // one line for help texts and schemas
+    std::string description;  // one line for help texts and schemas
 };
 
 }  // namespace shiftrig::plant

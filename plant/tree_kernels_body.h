@@ -107,7 +107,8 @@ inline void eliminate(const TreePaths& t, const double* __restrict lower, double
                 rb = SHIFTRIG_FMA(lower[b], rb, right[b - 1]);
                 right[--b] = rb;
             }
-            if (t.run_parent[p] >= 0) right[t.run_parent[p]] = SHIFTRIG_FMA(lower[b], rb, right[t.run_parent[p]]);
+            if (t.run_parent[p] >= 0)
+                right[t.run_parent[p]] = SHIFTRIG_FMA(lower[b], rb, right[t.run_parent[p]]);
             ra = right[a];
             while (a > a_begin) {
                 ra = SHIFTRIG_FMA(lower[a], ra, right[a - 1]);
@@ -121,7 +122,8 @@ inline void eliminate(const TreePaths& t, const double* __restrict lower, double
                 rb = SHIFTRIG_FMA(lower[b], rb, right[b - 1]);
                 right[--b] = rb;
             }
-            if (t.run_parent[p] >= 0) right[t.run_parent[p]] = SHIFTRIG_FMA(lower[b], rb, right[t.run_parent[p]]);
+            if (t.run_parent[p] >= 0)
+                right[t.run_parent[p]] = SHIFTRIG_FMA(lower[b], rb, right[t.run_parent[p]]);
             p -= 1;
         }
     }

@@ -26,7 +26,8 @@ concept Clock = requires(C clock, std::int64_t time) {
 // CLOCK_MONOTONIC: never set, slewed at most; it runs on while the process is stopped.
 struct SteadyClock {
     SHIFTRIG_TRUSTED_BEGIN  // clock_gettime does not enter the kernel
-    std::int64_t now() const SHIFTRIG_REALTIME {
+        std::int64_t
+        now() const SHIFTRIG_REALTIME {
         timespec t{};
         clock_gettime(CLOCK_MONOTONIC, &t);
         return t.tv_sec * nanoseconds_per_second + t.tv_nsec;

@@ -35,12 +35,8 @@ class Queue {
   private:
     // The library's functions carry no mark; try_enqueue and try_dequeue neither allocate nor lock.
     SHIFTRIG_TRUSTED_BEGIN
-    bool try_enqueue(const T& value) SHIFTRIG_REALTIME {
-        return queue_.try_enqueue(value);
-    }
-    bool try_dequeue(T& value) SHIFTRIG_REALTIME {
-        return queue_.try_dequeue(value);
-    }
+    bool try_enqueue(const T& value) SHIFTRIG_REALTIME { return queue_.try_enqueue(value); }
+    bool try_dequeue(T& value) SHIFTRIG_REALTIME { return queue_.try_dequeue(value); }
     SHIFTRIG_TRUSTED_END
 
     moodycamel::ReaderWriterQueue<T> queue_;

@@ -27,28 +27,30 @@ io::lcm::LinkOptions lcm_options(const Options& options) {
 
 }  // namespace
 
-Bus::Bus(const std::string& name, const io::can::Mapping* mapping, io::SignalTable& signals, const Options& options)
+Bus::Bus(const std::string& name, const io::can::Mapping* mapping, io::SignalTable& signals,
+         const Options& options)
     : name_(name) {
     if (name.starts_with("lcm:")) {
         lcm_.emplace(name.substr(4), signals, lcm_options(options));
         return;
     }
     if (!name.starts_with("can:") && !name.starts_with("udpcan:"))
-        throw io::InputError("bus " + name + ": unknown kind; it is inprocess, can:INTERFACE, udpcan:GROUP:PORT or lcm:URL");
+        throw io::InputError("bus " + name +
+                             ": unknown kind; it is inprocess, can:INTERFACE, udpcan:GROUP:PORT or lcm:URL");
     owned_.push_back(io::can::open_port(name, io::can::filters_of(*mapping, can_options(options).role)));
     wire_ = owned_.back().get();
     join_can(*wire_, *mapping, signals, options, io::can::AddressClaim::claim);
     can_->claim_addresses();
 }
 
-Bus::Bus(const std::string& name, io::can::CanPort& port, const io::can::Mapping& mapping, io::SignalTable& signals,
-         const Options& options)
+Bus::Bus(const std::string& name, io::can::CanPort& port, const io::can::Mapping& mapping,
+         io::SignalTable& signals, const Options& options)
     : name_(name) {
     join_can(port, mapping, signals, options, io::can::AddressClaim::settled);
 }
 
-void Bus::join_can(io::can::CanPort& wire, const io::can::Mapping& mapping, io::SignalTable& signals, const Options& options,
-                   io::can::AddressClaim claim) {
+void Bus::join_can(io::can::CanPort& wire, const io::can::Mapping& mapping, io::SignalTable& signals,
+                   const Options& options, io::can::AddressClaim claim) {
     auto can = can_options(options);
     can.address_claim = claim;
     port_ = &wire;
@@ -76,11 +78,14 @@ std::uint64_t Bus::messages_lost() const SHIFTRIG_REALTIME {
     return counters.send_dropped + counters.receive_dropped + counters.malformed;
 }
 
-std::vector<std::string> Bus::warnings() const { return can_ ? can_->warnings() : lcm_->warnings(); }
+std::vector<std::string> Bus::warnings() const {
+    return can_ ? can_->warnings() : lcm_->warnings();
+}
 
 std::vector<std::string> Bus::summary() const {
     std::vector<std::string> lines;
-    const auto add = [&](const std::string& message, const std::vector<std::pair<const char*, std::uint64_t>>& counts) {
+    const auto add = [&](const std::string& message,
+                         const std::vector<std::pair<const char*, std::uint64_t>>& counts) {
         std::string text;
         for (const auto& [what, count] : counts)
             if (count > 0) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + what;
@@ -88,22 +93,36 @@ std::vector<std::string> Bus::summary() const {
     };
     if (lcm_) {
         for (const auto& r : lcm_->report())
-            add(r.channel, {{"lost", r.lost}, {"stale", r.stale}, {"implausible", r.implausible}, {"restarts of the sender", r.restarts}});
+            add(r.channel, {{"lost", r.lost},
+                            {"stale", r.stale},
+                            {"implausible", r.implausible},
+                            {"restarts of the sender", r.restarts}});
         const auto c = lcm_->counters();
-        add("as a whole", {{"not sent", c.send_failed + c.send_dropped}, {"of another type refused", c.refused}, {"received but not read", c.receive_dropped}});
+        add("as a whole", {{"not sent", c.send_failed + c.send_dropped},
+                           {"of another type refused", c.refused},
+                           {"received but not read", c.receive_dropped}});
         return lines;
     }
     for (const auto& r : can_->report())
-        add(r.name, {{"of wrong length", r.wrong_length}, {"with wrong checksum", r.wrong_checksum}, {"with wrong counter", r.wrong_counter},
-                     {"implausible", r.implausible}, {"missed", r.missed}, {"time-outs", r.timeouts},
-                     {"values limited", r.limited}, {"not sent", r.send_dropped}});
+        add(r.name, {{"of wrong length", r.wrong_length},
+                     {"with wrong checksum", r.wrong_checksum},
+                     {"with wrong counter", r.wrong_counter},
+                     {"implausible", r.implausible},
+                     {"missed", r.missed},
+                     {"time-outs", r.timeouts},
+                     {"values limited", r.limited},
+                     {"not sent", r.send_dropped}});
     for (const auto& t : can_->troubles())
         add("trouble code SPN " + std::to_string(t.spn) + " FMI " + std::to_string(t.fmi) + " of " + t.node,
             {{t.active ? "times active, the last to the end" : "times active", t.occurrences}});
     const auto c = port_->counters();
     if (name_ != "inprocess") add("as a whole", {{"frames sent", c.sent}, {"received", c.received}});
-    add("as a whole", {{"frames not sent", c.send_dropped}, {"frames lost in reception", c.receive_dropped}, {"malformed", c.malformed},
-                       {"error frames", c.error_frames}, {"times bus-off", c.bus_off_events}, {"reconnects", c.reconnects}});
+    add("as a whole", {{"frames not sent", c.send_dropped},
+                       {"frames lost in reception", c.receive_dropped},
+                       {"malformed", c.malformed},
+                       {"error frames", c.error_frames},
+                       {"times bus-off", c.bus_off_events},
+                       {"reconnects", c.reconnects}});
     return lines;
 }
 

@@ -6,7 +6,8 @@
 
 namespace shiftrig::rig {
 
-Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tick_ns, io::SignalTable& signals)
+Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tick_ns,
+             io::SignalTable& signals)
     : silences_(setup.silences) {
     if (model.can.IsDefined()) mapping_ = io::can::parse_mapping(model.can, model.path);
     bus::Options options;
@@ -31,7 +32,8 @@ Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tic
     for (const auto& name : setup.names) {
         const bool frames = !name.starts_with("lcm:");
         if (frames && !mapping_)
-            throw io::InputError(model.path, 0, 0, "bus " + name + " needs the stanza `can:`, which says what the frames mean");
+            throw io::InputError(model.path, 0, 0,
+                                 "bus " + name + " needs the stanza `can:`, which says what the frames mean");
         if (name != "inprocess") {
             buses_.emplace_back(name, mapping_ ? &*mapping_ : nullptr, signals, options);
         } else {
@@ -53,7 +55,8 @@ void Buses::receive(std::int64_t now_ns, io::SignalTable& signals) SHIFTRIG_REAL
     for (auto& each : buses_) {
         each.receive(now_ns, signals);
         for (io::can::FaultEvent event; each.next_fault(event);)
-            signals.value[static_cast<std::size_t>(fault_signals_[static_cast<std::size_t>(event.fault)])] = event.begins ? 1 : 0;
+            signals.value[static_cast<std::size_t>(fault_signals_[static_cast<std::size_t>(event.fault)])] =
+                event.begins ? 1 : 0;
     }
 }
 

@@ -20,14 +20,14 @@ struct Silence {
 };
 
 struct BusSetup {
-    std::vector<std::string> names;                   // as the user gives them; see apps/bus/bus.h
-    std::optional<tcu::Calibration> built_in;         // the reference controller on `inprocess`
-    std::string calibration_path;                     // where that was read from
-    std::vector<Silence> silences;                    // of the built-in controller
+    std::vector<std::string> names;            // as the user gives them; see apps/bus/bus.h
+    std::optional<tcu::Calibration> built_in;  // the reference controller on `inprocess`
+    std::string calibration_path;              // where that was read from
+    std::vector<Silence> silences;             // of the built-in controller
     bool lockstep = false;
-    std::string can_log, can_replay;                  // of the first CAN bus; see bus::Options
-    YAML::Node faults;                                // of every CAN bus (io/can/faults.h); null: none
-    std::string faults_file;                          // where they are written
+    std::string can_log, can_replay;  // of the first CAN bus; see bus::Options
+    YAML::Node faults;                // of every CAN bus (io/can/faults.h); null: none
+    std::string faults_file;          // where they are written
 };
 
 class Buses {
@@ -71,7 +71,7 @@ class Buses {
 
     std::optional<io::can::Mapping> mapping_;
     std::optional<io::can::FaultPlan> faults_;
-    std::unique_ptr<io::can::InProcessBus> wire_;     // ends: 0 the rig, 1 the built-in controller
+    std::unique_ptr<io::can::InProcessBus> wire_;  // ends: 0 the rig, 1 the built-in controller
     std::vector<bus::Bus> buses_;
     std::unique_ptr<tcu::Node> node_;
     std::vector<int> fault_signals_;  // `bus.fault.<n>.status`: 1 while it acts

@@ -22,7 +22,8 @@ struct ScenarioController {
 std::int64_t nanoseconds(const std::string& path, const io::Entry& entry) {
     double seconds = 0;
     if (!YAML::convert<double>::decode(entry.value, seconds) || !(seconds >= 0 && seconds < 1e9))
-        io::fail(path, entry.mark, "controller: " + entry.key + " = " + io::as_written(entry.value) + "; must be a time in s");
+        io::fail(path, entry.mark,
+                 "controller: " + entry.key + " = " + io::as_written(entry.value) + "; must be a time in s");
     return std::llround(seconds * 1e9);
 }
 
@@ -36,26 +37,37 @@ ScenarioController read_controller(const io::ScenarioFile& scenario) {
     }
     for (const auto& entry : io::entries(scenario.path, node, node.Mark(), "controller ")) {
         if (entry.key == "calibration" && entry.value.IsScalar()) {
-            result.calibration = (std::filesystem::path(scenario.path).parent_path() / entry.value.Scalar()).string();
+            result.calibration =
+                (std::filesystem::path(scenario.path).parent_path() / entry.value.Scalar()).string();
         } else if (entry.key == "silent" && entry.value.IsSequence()) {
             for (const auto& item : entry.value) {
                 Silence silence;
-                for (const auto& time : io::entries(scenario.path, item, item.Mark(), "controller: silent ")) {
-                    if (time.key == "from_s") silence.from_ns = nanoseconds(scenario.path, time);
-                    else if (time.key == "until_s") silence.until_ns = nanoseconds(scenario.path, time);
-                    else io::fail(scenario.path, time.mark, "controller: silent." + time.key + " is not a known key; known: from_s, until_s");
+                for (const auto& time :
+                     io::entries(scenario.path, item, item.Mark(), "controller: silent ")) {
+                    if (time.key == "from_s")
+                        silence.from_ns = nanoseconds(scenario.path, time);
+                    else if (time.key == "until_s")
+                        silence.until_ns = nanoseconds(scenario.path, time);
+                    else
+                        io::fail(
+                            scenario.path, time.mark,
+                            "controller: silent." + time.key + " is not a known key; known: from_s, until_s");
                 }
                 result.silences.push_back(silence);
             }
         } else {
             io::fail(scenario.path, entry.mark,
-                     "controller: " + entry.key + " is not a known key, or not of its kind; known: calibration: FILE, silent: [{from_s, until_s}]; or `controller: none`");
+                     "controller: " + entry.key +
+                         " is not a known key, or not of its kind; known: calibration: FILE, silent: "
+                         "[{from_s, until_s}]; or `controller: none`");
         }
     }
     return result;
 }
 
-bool is_built_in(const std::string& controller) { return controller == "builtin" || controller.starts_with("builtin:"); }
+bool is_built_in(const std::string& controller) {
+    return controller == "builtin" || controller.starts_with("builtin:");
+}
 
 plant::KernelKind kernel_named(const std::string& name) {
     static const std::map<std::string, plant::KernelKind> kinds = {{"auto", plant::KernelKind::automatic},
@@ -63,18 +75,23 @@ plant::KernelKind kernel_named(const std::string& name) {
                                                                    {"avx2", plant::KernelKind::avx2},
                                                                    {"avx512", plant::KernelKind::avx512}};
     const auto found = kinds.find(name);
-    if (found == kinds.end()) throw std::invalid_argument("--kernel " + name + ": it is auto, portable, avx2 or avx512");
+    if (found == kinds.end())
+        throw std::invalid_argument("--kernel " + name + ": it is auto, portable, avx2 or avx512");
     return found->second;
 }
 
 void choose_controller(const Choices& choices, Setup& setup) {
     auto& buses = setup.buses;
-    const ScenarioController scripted = setup.scenario ? read_controller(*setup.scenario) : ScenarioController{};
+    const ScenarioController scripted =
+        setup.scenario ? read_controller(*setup.scenario) : ScenarioController{};
     std::string controller = choices.controller;
-    const auto inprocess_given = [&] { return std::count(buses.names.begin(), buses.names.end(), "inprocess") > 0; };
+    const auto inprocess_given = [&] {
+        return std::count(buses.names.begin(), buses.names.end(), "inprocess") > 0;
+    };
 
     if (controller.empty()) {
-        const bool nobody = scripted.none || !choices.can_replay.empty() || !setup.model.can.IsDefined() || (!buses.names.empty() && !inprocess_given());
+        const bool nobody = scripted.none || !choices.can_replay.empty() || !setup.model.can.IsDefined() ||
+                            (!buses.names.empty() && !inprocess_given());
         controller = nobody ? "none" : "builtin";
     }
     const bool logs = !choices.can_log.empty() || !choices.can_replay.empty();

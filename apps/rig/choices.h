@@ -13,9 +13,9 @@ struct Choices {
     double rate_hz = 1000;           // of the ticks
     int substeps = 1;                // plant steps per tick
     std::vector<std::string> buses;  // empty: inprocess, where the model says what frames mean
-    std::string controller;          // "builtin[:FILE]", "none", a command to start; empty: the scenario's, else
-                                     // builtin on the in-process bus and nobody elsewhere
-    std::string kernel = "auto";     // auto, portable, avx2, avx512
+    std::string controller;       // "builtin[:FILE]", "none", a command to start; empty: the scenario's, else
+                                  // builtin on the in-process bus and nobody elsewhere
+    std::string kernel = "auto";  // auto, portable, avx2, avx512
     bool lockstep = false;
     std::string can_log, can_replay;  // candump logs: written, and heard as if from the bus
 };

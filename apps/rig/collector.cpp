@@ -10,7 +10,8 @@ namespace {
 
 // What a shift is judged by (docs/shift-quality.md).
 bool matters_for_shifts(std::string_view name) {
-    for (const char* prefix : {"clutch.", "driver.", "mass.", "body.", "shaft.", "engine.", "controller.", "rig.safe_command"})
+    for (const char* prefix :
+         {"clutch.", "driver.", "mass.", "body.", "shaft.", "engine.", "controller.", "rig.safe_command"})
         if (name.starts_with(prefix)) return true;
     return false;
 }
@@ -35,7 +36,8 @@ Collector::Collector(const Rig& rig, std::int64_t ticks, const CollectorOptions&
         return static_cast<std::size_t>(ticks) * (signals + 1) * sizeof(double) <= options.most_bytes;
     };
     const auto wanted = [&](const std::string& name) {
-        return options.only.empty() || std::find(options.only.begin(), options.only.end(), name) != options.only.end();
+        return options.only.empty() ||
+               std::find(options.only.begin(), options.only.end(), name) != options.only.end();
     };
     for (int i = 0; i < table.size(); ++i)
         if (wanted(table.signal(i).name)) signals_.push_back(i);
@@ -73,13 +75,15 @@ void Collector::make_room(std::size_t ticks) {
 }
 
 SHIFTRIG_TRUSTED_BEGIN  // the columns have their room
-void Collector::turn_over() SHIFTRIG_REALTIME {
+    void
+    Collector::turn_over() SHIFTRIG_REALTIME {
     const std::size_t width = signals_.size() + 1;
     for (std::size_t first = 0; first < row_count_; first += batch) {
         const std::size_t end = std::min(first + batch, row_count_);
         for (std::size_t i = first; i < end; ++i) run_.time.push_back(rows_[i * width]);
         for (std::size_t c = 0; c < run_.columns.size(); ++c)
-            for (std::size_t i = first; i < end; ++i) run_.columns[c].value.push_back(rows_[i * width + c + 1]);
+            for (std::size_t i = first; i < end; ++i)
+                run_.columns[c].value.push_back(rows_[i * width + c + 1]);
     }
     row_count_ = 0;
 }
@@ -92,8 +96,9 @@ analysis::Run Collector::finish(const Rig& rig) {
     analysis::Run run = std::move(run_);
     const auto& devices = rig.model().device_names();
     for (const auto& event : plant_events_)
-        run.changes.push_back({event, event.device >= 0 ? devices[static_cast<std::size_t>(event.device)] : "",
-                                plant::explain(rig.model(), event), std::string(io::name(event.kind))});
+        run.changes.push_back({event,
+                               event.device >= 0 ? devices[static_cast<std::size_t>(event.device)] : "",
+                               plant::explain(rig.model(), event), std::string(io::name(event.kind))});
     for (const auto& event : rig_events_) {
         analysis::Change change;
         change.event.time = event.time;

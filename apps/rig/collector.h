@@ -14,7 +14,8 @@ namespace shiftrig::rig {
 
 struct CollectorOptions {
     std::size_t most_bytes = std::size_t{256} << 20;
-    bool by_the_clock = true;  // take() has a deadline: memory is in place, columns wait. false: what takes least in all
+    bool by_the_clock =
+        true;  // take() has a deadline: memory is in place, columns wait. false: what takes least in all
     std::size_t most_events = 100'000;
     std::vector<std::string> only;  // keep these signals only; empty: all
 };

@@ -64,14 +64,22 @@ void accumulate(plant::Certificate& worst, const plant::Certificate& step) SHIFT
 }  // namespace
 
 Rig::Rig(Setup setup)
-    : setup_(with_options(std::move(setup))), model_(build(setup_)), operators_(model_), state_(model_), inputs_(model_),
-      outputs_(model_), scratch_(model_), signals_(table_of(model_, own_)),
+    : setup_(with_options(std::move(setup))),
+      model_(build(setup_)),
+      operators_(model_),
+      state_(model_),
+      inputs_(model_),
+      outputs_(model_),
+      scratch_(model_),
+      signals_(table_of(model_, own_)),
       settable_(settable(model_, signals_)),
-      buses_(setup_.buses, setup_.model, setup_.tick_ns, signals_), safe_commands_(setup_.model, model_) {
+      buses_(setup_.buses, setup_.model, setup_.tick_ns, signals_),
+      safe_commands_(setup_.model, model_) {
     settable_.resize(static_cast<std::size_t>(signals_.size()), false);  // what the buses added is not
     for (const auto& input : model_.inputs()) ranges_.emplace_back(input.minimum, input.maximum);
     const auto& side = setup_.model.controller;
-    if (!side.pedal_clutch.empty()) pedal_release_ = model_.input("clutch." + side.pedal_clutch + ".release_command");
+    if (!side.pedal_clutch.empty())
+        pedal_release_ = model_.input("clutch." + side.pedal_clutch + ".release_command");
     service_brake_ = model_.input("driver.brake");
     for (int i = 0; i < signals_.size(); ++i) {
         const auto& name = signals_.signal(i).name;
@@ -92,13 +100,14 @@ void Rig::begin() {
         io::check_signals(scenario, signals_);
         timeline_ = Timeline(scenario, signals_, settable_);
         for (const auto& setting : scenario.start.inputs)
-            signals_.value[static_cast<std::size_t>(find_settable(signals_, settable_, scenario.path, setting.quantity))] =
-                setting.value;
+            signals_.value[static_cast<std::size_t>(
+                find_settable(signals_, settable_, scenario.path, setting.quantity))] = setting.value;
         copy_inputs();
         if (setup_.resumes) return;
         plant::Start start;
         start.locked = scenario.start.locked;
-        for (const auto& speed : scenario.start.speeds) start.speeds.emplace_back(speed.quantity.signal, speed.value);
+        for (const auto& speed : scenario.start.speeds)
+            start.speeds.emplace_back(speed.quantity.signal, speed.value);
         if (!start.locked.empty() || !start.speeds.empty()) plant::start(model_, state_, start, inputs_);
         settle(scenario.start.settle);
     }
@@ -108,7 +117,8 @@ void Rig::begin() {
 
 void Rig::settle(double seconds) {
     const auto steps = std::llround(seconds / model_.step_size());
-    for (long long i = 0; i < steps; ++i) plant::step(model_, operators_, state_, inputs_, outputs_, scratch_);
+    for (long long i = 0; i < steps; ++i)
+        plant::step(model_, operators_, state_, inputs_, outputs_, scratch_);
     plant::begin_account(model_, state_);
 }
 
@@ -147,7 +157,8 @@ void Rig::copy_inputs() SHIFTRIG_REALTIME {
         double& release = inputs_.value[static_cast<std::size_t>(pedal_release_)];
         release = std::max(release, value(own_.clutch_pedal));
     }
-    if (service_brake_ >= 0 && value(own_.parking_brake) > 0.5) inputs_.value[static_cast<std::size_t>(service_brake_)] = 1;
+    if (service_brake_ >= 0 && value(own_.parking_brake) > 0.5)
+        inputs_.value[static_cast<std::size_t>(service_brake_)] = 1;
 }
 
 void Rig::watch_the_controller(std::int64_t now_ns) SHIFTRIG_REALTIME {
@@ -155,7 +166,8 @@ void Rig::watch_the_controller(std::int64_t now_ns) SHIFTRIG_REALTIME {
     safe_commands_.apply(buses_.command_valid(), now_ns, inputs_.value);
     const bool active = safe_commands_.active();
     signals_.value[static_cast<std::size_t>(own_.safe_command)] = active ? 1 : 0;
-    if (active != was_active) note(active ? RigEventKind::safe_command : RigEventKind::commands_return, own_.safe_command, active);
+    if (active != was_active)
+        note(active ? RigEventKind::safe_command : RigEventKind::commands_return, own_.safe_command, active);
     for (std::size_t i = 0; i < statuses_.size(); ++i) {
         const double status = signals_.value[static_cast<std::size_t>(statuses_[i])];
         if (status != last_status_[i]) note(RigEventKind::message_status, statuses_[i], status);
@@ -170,9 +182,11 @@ void Rig::step_plant() SHIFTRIG_REALTIME {
     for (int i = 0; i < setup_.substeps; ++i) {
         plant::step(model_, operators_, state_, inputs_, outputs_, scratch_);
         accumulate(certificate_, outputs_.certificate);
-        const auto kept = static_cast<std::size_t>(std::min(outputs_.event_count, plant::Outputs::event_capacity));
+        const auto kept =
+            static_cast<std::size_t>(std::min(outputs_.event_count, plant::Outputs::event_capacity));
         const std::size_t fit = std::min(kept, events_.size() - event_count_);
-        std::copy_n(outputs_.events.begin(), fit, events_.begin() + static_cast<std::ptrdiff_t>(event_count_));
+        std::copy_n(outputs_.events.begin(), fit,
+                    events_.begin() + static_cast<std::ptrdiff_t>(event_count_));
         event_count_ += fit;
         events_not_kept_ += outputs_.event_count - static_cast<int>(fit);
     }
@@ -197,7 +211,8 @@ void Rig::change_machine(io::ModelFile file) {
     changed = with_options(std::move(changed));
     plant::Model model = build(changed);
     if (model.state_size() != model_.state_size())
-        throw std::invalid_argument("this changes what the machine's state is made of: start the rig anew with it");
+        throw std::invalid_argument(
+            "this changes what the machine's state is made of: start the rig anew with it");
     setup_.model = std::move(changed.model);
     model_ = std::move(model);
     operators_ = plant::Operators(model_);
@@ -215,10 +230,13 @@ void Rig::report_timing(std::int64_t overruns, double load) SHIFTRIG_REALTIME {
 }
 
 void Rig::note(RigEventKind kind, int signal, double value) SHIFTRIG_REALTIME {
-    if (rig_event_count_ < rig_events_.size()) rig_events_[rig_event_count_++] = {sim_time(), kind, signal, value};
+    if (rig_event_count_ < rig_events_.size())
+        rig_events_[rig_event_count_++] = {sim_time(), kind, signal, value};
 }
 
-bool Rig::wait_for_answer(std::int64_t timeout_ns) { return buses_.wait_for_answer(sim_time_ns(), signals_, timeout_ns); }
+bool Rig::wait_for_answer(std::int64_t timeout_ns) {
+    return buses_.wait_for_answer(sim_time_ns(), signals_, timeout_ns);
+}
 
 std::span<const double> Rig::rig_values() const SHIFTRIG_REALTIME {
     return std::span(signals_.value).subspan(inputs_.value.size() + outputs_.value.size());

@@ -66,8 +66,10 @@ class Rig {
     // false if it did not. True at once where nothing is awaited.
     bool wait_for_answer(std::int64_t timeout_ns);
 
-    std::int64_t ticks() const noexcept { return ticks_; }                        // done
-    std::int64_t sim_time_ns() const noexcept { return ticks_ * setup_.tick_ns; }  // at the end of the last tick
+    std::int64_t ticks() const noexcept { return ticks_; }  // done
+    std::int64_t sim_time_ns() const noexcept {
+        return ticks_ * setup_.tick_ns;
+    }  // at the end of the last tick
     double sim_time() const noexcept { return static_cast<double>(sim_time_ns()) * 1e-9; }
 
     // The plant's inputs, its outputs and the rig's own signals, in this order. value() gives inputs as applied, which is
@@ -79,8 +81,9 @@ class Rig {
     }
     std::span<const double> input_values() const noexcept { return inputs_.value; }
     std::span<const double> output_values() const noexcept { return outputs_.value; }
-    std::span<const double> rig_values() const SHIFTRIG_REALTIME;  // everything in the table behind inputs and outputs
-    std::vector<plant::Signal> rig_signals() const;       // the same, by name
+    std::span<const double> rig_values() const
+        SHIFTRIG_REALTIME;                           // everything in the table behind inputs and outputs
+    std::vector<plant::Signal> rig_signals() const;  // the same, by name
 
     const plant::Model& model() const noexcept { return model_; }
     const Setup& setup() const noexcept { return setup_; }
@@ -91,7 +94,9 @@ class Rig {
     std::span<const plant::Event> plant_events() const noexcept { return {events_.data(), event_count_}; }
     int plant_events_not_kept() const noexcept { return events_not_kept_; }
     std::span<const RigEvent> rig_events() const noexcept { return {rig_events_.data(), rig_event_count_}; }
-    const plant::Certificate& certificate() const noexcept { return certificate_; }  // worst and sums over the substeps
+    const plant::Certificate& certificate() const noexcept {
+        return certificate_;
+    }  // worst and sums over the substeps
 
     // A change of an input or of a driver's signal from another thread, taken at the next tick; false if `signal` may
     // not be set or too many are waiting. One thread only.
@@ -130,14 +135,14 @@ class Rig {
     plant::Model model_;
     plant::Operators operators_;
     plant::State state_;
-    plant::Inputs inputs_;    // as applied
+    plant::Inputs inputs_;  // as applied
     plant::Outputs outputs_;
     plant::Scratch scratch_;
     RigSignals own_{};
     io::SignalTable signals_;
-    std::vector<bool> settable_;                      // by signal
-    std::vector<std::pair<double, double>> ranges_;   // of the inputs
-    int pedal_release_ = -1, service_brake_ = -1;     // inputs
+    std::vector<bool> settable_;                     // by signal
+    std::vector<std::pair<double, double>> ranges_;  // of the inputs
+    int pedal_release_ = -1, service_brake_ = -1;    // inputs
     Timeline timeline_;
     Buses buses_;
     SafeCommands safe_commands_;
@@ -150,7 +155,7 @@ class Rig {
     std::array<RigEvent, 32> rig_events_;
     std::size_t rig_event_count_ = 0;
     plant::Certificate certificate_;
-    std::vector<int> statuses_;        // signals `bus.<message>.status`
+    std::vector<int> statuses_;  // signals `bus.<message>.status`
     std::vector<double> last_status_;
 };
 

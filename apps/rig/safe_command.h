@@ -27,9 +27,9 @@ class SafeCommands {
   private:
     struct Ramp {
         int input;
-        double safe;           // [the input's unit]
-        std::int64_t within;   // [ns]
-        double from = 0;       // when the command was lost
+        double safe;          // [the input's unit]
+        std::int64_t within;  // [ns]
+        double from = 0;      // when the command was lost
     };
     std::vector<Ramp> ramps_;
     bool active_ = false;

@@ -21,7 +21,8 @@ SHIFTRIG_TRUSTED_END
 
 }  // namespace
 
-Session::Session(Rig& rig, SessionOptions options) : rig_(rig), options_(std::move(options)), loop_(options_.loop) {
+Session::Session(Rig& rig, SessionOptions options)
+    : rig_(rig), options_(std::move(options)), loop_(options_.loop) {
     if (options_.trace) {
         span_tick_ = options_.trace->name("tick");
         span_record_ = options_.trace->name("record");
@@ -57,7 +58,8 @@ void Session::tick(const rt::Tick& t) SHIFTRIG_REALTIME {
     const std::int64_t ended = clock_.now();
     compute_ns_ = ended - began;
     rig_time_.record(compute_ns_);
-    for (std::int64_t latency; rig_.buses().next_command_latency(latency);) command_to_signal_.record(latency);
+    for (std::int64_t latency; rig_.buses().next_command_latency(latency);)
+        command_to_signal_.record(latency);
 
     if (options_.recording) record(t, began);
     if (options_.collector) options_.collector->take(rig_);
@@ -98,7 +100,9 @@ io::Manifest manifest_of(const Rig& rig, const rt::LoopSettings& loop) {
         m.scenario_text = setup.scenario->text;
         for (const auto& [gear, option] : setup.scenario->start.options) m.overrides[gear] = option;
     }
-    m.facts["pace"] = loop.pace == rt::Pace::wall ? "wall" : loop.pace == rt::Pace::lockstep ? "lockstep" : "free";
+    m.facts["pace"] = loop.pace == rt::Pace::wall       ? "wall"
+                      : loop.pace == rt::Pace::lockstep ? "lockstep"
+                                                        : "free";
     m.facts["engine"] = model.engine();
     m.facts["kernel"] = model.kernel();
     m.facts["compiler"] = __VERSION__;

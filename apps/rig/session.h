@@ -17,11 +17,11 @@
 namespace shiftrig::rig {
 
 struct SessionOptions {
-    rt::LoopSettings loop;                      // period and number of slots are the rig's and the scenario's
-    io::RecordingWriter* recording = nullptr;   // begun by the session, not ended
+    rt::LoopSettings loop;                     // period and number of slots are the rig's and the scenario's
+    io::RecordingWriter* recording = nullptr;  // begun by the session, not ended
     Collector* collector = nullptr;
     rt::Trace* trace = nullptr;
-    std::map<std::string, std::string> facts;   // said in the recording besides those of manifest_of
+    std::map<std::string, std::string> facts;  // said in the recording besides those of manifest_of
     // In the loop, before and after every tick. Whoever sets them keeps the loop's promise: no waiting, no allocation.
     std::function<void(Rig&, const rt::Tick&)> before, after;
 };
@@ -30,7 +30,9 @@ class Session {
   public:
     Session(Rig& rig, SessionOptions options);
 
-    rt::LoopControl& control() noexcept { return loop_.control(); }  // stop, pause, single step, speed: any thread
+    rt::LoopControl& control() noexcept {
+        return loop_.control();
+    }  // stop, pause, single step, speed: any thread
     // The whole run, in the calling thread.
     const rt::LoopReport& run();
     const rt::LoopReport& report() const noexcept { return loop_.report(); }  // whole when run() has returned

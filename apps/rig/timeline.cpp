@@ -15,7 +15,8 @@ int find_settable(const io::SignalTable& signals, const std::vector<bool>& setta
                                     : quantity.written + ": there is no such input; near it: " + near);
 }
 
-Timeline::Timeline(const io::ScenarioFile& scenario, const io::SignalTable& signals, const std::vector<bool>& settable) {
+Timeline::Timeline(const io::ScenarioFile& scenario, const io::SignalTable& signals,
+                   const std::vector<bool>& settable) {
     for (const auto& timed : scenario.timeline)
         entries_.push_back({std::llround(timed.at * 1e9), std::llround(timed.over * 1e9),
                             find_settable(signals, settable, scenario.path, timed.setting.quantity),
@@ -23,7 +24,9 @@ Timeline::Timeline(const io::ScenarioFile& scenario, const io::SignalTable& sign
 }
 
 void Timeline::apply(std::int64_t time_ns, io::SignalTable& signals) SHIFTRIG_REALTIME {
-    const auto value_of = [&](const Entry& e) -> double& { return signals.value[static_cast<std::size_t>(e.signal)]; };
+    const auto value_of = [&](const Entry& e) -> double& {
+        return signals.value[static_cast<std::size_t>(e.signal)];
+    };
     begun_ = next_;
     for (; next_ < entries_.size() && entries_[next_].at <= time_ns; ++next_) {
         Entry& e = entries_[next_];

@@ -29,12 +29,15 @@ class Timeline {
     };
 
     Timeline() = default;
-    Timeline(const io::ScenarioFile& scenario, const io::SignalTable& signals, const std::vector<bool>& settable);
+    Timeline(const io::ScenarioFile& scenario, const io::SignalTable& signals,
+             const std::vector<bool>& settable);
 
     // Sets what is due at `time_ns`: an entry at s acts from the first tick with t ≥ s on.
     void apply(std::int64_t time_ns, io::SignalTable& signals) SHIFTRIG_REALTIME;
     // The entries that the last apply() began.
-    std::span<const Entry> begun() const noexcept { return std::span(entries_).subspan(begun_, next_ - begun_); }
+    std::span<const Entry> begun() const noexcept {
+        return std::span(entries_).subspan(begun_, next_ - begun_);
+    }
 
     void archive(io::Archive& a) { a(entries_, begun_, next_, oldest_); }
 

@@ -113,7 +113,8 @@ void Dashboard::take(const rig::Rig& rig) SHIFTRIG_REALTIME {
     filling_.ticks = rig.ticks();
     filling_.overruns = static_cast<std::int64_t>(rig.value(rig.own().overruns));
     const tcu::Node* built_in = rig.buses().built_in();
-    filling_.limp = built_in ? built_in->controller().mode() == tcu::Mode::limp : limp_ >= 0 && rig.value(limp_) != 0;
+    filling_.limp =
+        built_in ? built_in->controller().mode() == tcu::Mode::limp : limp_ >= 0 && rig.value(limp_) != 0;
     filling_.count = static_cast<std::uint32_t>(
         std::min<std::size_t>(most_signals, static_cast<std::size_t>(rig.signals().size())));
     for (std::uint32_t i = 0; i < filling_.count; ++i) filling_.value[i] = rig.value(static_cast<int>(i));

@@ -131,9 +131,10 @@ struct HttpServer::Implementation {
         });
         server.set_error_handler([](const httplib::Request&, httplib::Response& response) {
             if (!response.body.empty()) return;
-            response.set_content(response.status == 404   ? "there is nothing of this name here\n"
-                                 : response.status == 413 ? "a command has at most " + std::to_string(longest_command) + " bytes\n"
-                                                          : std::string("this is no request that the dashboard understands\n"),
+            response.set_content(response.status == 404 ? "there is nothing of this name here\n"
+                                 : response.status == 413
+                                     ? "a command has at most " + std::to_string(longest_command) + " bytes\n"
+                                     : std::string("this is no request that the dashboard understands\n"),
                                  "text/plain");
         });
         server.Get("/", [](const httplib::Request&, httplib::Response& response) {

@@ -106,7 +106,8 @@ class Page {
             slips.push_back("freewheel." + freewheel.name + ".slip");
         }
         for (const auto& shaft : machine_.shafts) shafts.push_back("shaft." + shaft.name + ".torque");
-        for (const auto& backlash : machine_.backlashes) shafts.push_back("backlash." + backlash.name + ".torque");
+        for (const auto& backlash : machine_.backlashes)
+            shafts.push_back("backlash." + backlash.name + ".torque");
         for (const auto& sensor : machine_.sensors) speeds.push_back("mass." + sensor.mass + ".speed");
         if (speeds.empty())
             for (const auto& mass : machine_.masses)

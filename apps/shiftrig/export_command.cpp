@@ -32,7 +32,8 @@ int run(const Options& options) {
     int worst = good;
     if (!options.csv.empty()) worst = std::max(worst, export_to(options, options.csv, io::export_csv));
     if (!options.mcap.empty()) worst = std::max(worst, export_to(options, options.mcap, io::export_mcap));
-    if (!options.candump.empty()) worst = std::max(worst, export_to(options, options.candump, io::export_candump));
+    if (!options.candump.empty())
+        worst = std::max(worst, export_to(options, options.candump, io::export_candump));
     return worst;
 }
 
@@ -42,7 +43,9 @@ Command::Run declare(CLI::App& app) {
     auto* formats = app.add_option_group("formats");
     formats->add_option("--csv", options->csv, "a column per signal, a row per tick; - is standard output");
     formats->add_option("--mcap", options->mcap, "for Foxglove and PlotJuggler");
-    formats->add_option("--candump", options->candump, "the signals as frames of the machine's CAN mapping; python-can makes BLF or ASC of it");
+    formats->add_option(
+        "--candump", options->candump,
+        "the signals as frames of the machine's CAN mapping; python-can makes BLF or ASC of it");
     formats->require_option(1, 0);
     return [options] { return run(*options); };
 }

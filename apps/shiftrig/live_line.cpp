@@ -22,18 +22,20 @@ int first_of(const rig::Rig& rig, const char* kind, const char* quantity) {
 LiveLine::LiveLine(const rig::Rig& rig) : shown_(isatty(STDERR_FILENO) != 0), own_(rig.own()) {
     const auto& machine = rig.model().description();
     gear_ = rig.signals().find("controller.current_gear");
-    engine_ = machine.engines.empty() ? -1 : rig.signals().find("mass." + machine.engines.front().mass + ".speed");
+    engine_ =
+        machine.engines.empty() ? -1 : rig.signals().find("mass." + machine.engines.front().mass + ".speed");
     vehicle_ = -1;
     for (const auto& mass : machine.masses)
-        if (mass.motion == plant::Motion::translating) vehicle_ = rig.signals().find("mass." + mass.name + ".speed");
+        if (mass.motion == plant::Motion::translating)
+            vehicle_ = rig.signals().find("mass." + mass.name + ".speed");
     slip_ = first_of(rig, "tyre.", ".slip");
 }
 
 void LiveLine::take(const rig::Rig& rig) SHIFTRIG_REALTIME {
     if (!shown_ || ++taken_ % 20 != 0) return;
     const auto value = [&](int signal) { return signal < 0 ? 0 : rig.value(signal); };
-    latest_.write({rig.sim_time(), value(gear_), value(engine_), value(vehicle_), value(slip_), value(own_.tick_load),
-                   value(own_.safe_command)});
+    latest_.write({rig.sim_time(), value(gear_), value(engine_), value(vehicle_), value(slip_),
+                   value(own_.tick_load), value(own_.safe_command)});
 }
 
 void LiveLine::show() {

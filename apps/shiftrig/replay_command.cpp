@@ -122,7 +122,8 @@ int run_on(io::RecordingReader& reader, const Options& options) {
 // Data of a real machine: a table, or the log of its bus as the model's stanza `can:` understands it.
 io::FieldRecording read_field(const Options& options, const io::ModelFile& file) {
     if (!io::looks_like_candump(options.recording)) return io::read_field_csv(options.recording);
-    if (!file.can.IsDefined()) throw io::InputError(options.model, 0, 0, "has no stanza `can:`, which says what the frames mean");
+    if (!file.can.IsDefined())
+        throw io::InputError(options.model, 0, 0, "has no stanza `can:`, which says what the frames mean");
     return io::read_field_candump(options.recording, io::can::parse_mapping(file.can, file.path));
 }
 
@@ -184,7 +185,8 @@ int run_field(const Options& options) {
 }
 
 int run(const Options& options) {
-    if (options.recording.ends_with(".csv") || io::looks_like_candump(options.recording)) return run_field(options);
+    if (options.recording.ends_with(".csv") || io::looks_like_candump(options.recording))
+        return run_field(options);
     io::RecordingReader reader(options.recording);
     try {
         return run_on(reader, options);
@@ -206,7 +208,8 @@ Command::Run declare(CLI::App& app) {
     auto* field = app.add_option_group("field recordings (.csv, candump)");
     field->add_option("--locked", options->locked, "devices locked at the start: Fc,F2")->delimiter(',');
     field->add_option("--option", options->options, "gear option in use: range=M; repeatable");
-    field->add_option("--hold", options->held, "an input that was not measured, held: environment.draft=1; repeatable");
+    field->add_option("--hold", options->held,
+                      "an input that was not measured, held: environment.draft=1; repeatable");
     field->add_option("--step", options->step_s, "step size of the plant [s]")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();

@@ -37,12 +37,14 @@ std::vector<std::string> wanted_signals(const std::string& recording) {
 }
 
 void print_json(const analysis::Scorecard& card) {
-    const nlohmann::json result = {{"verdict", analysis::name(card.verdict)}, {"shifts", analysis::to_json(card)}};
+    const nlohmann::json result = {{"verdict", analysis::name(card.verdict)},
+                                   {"shifts", analysis::to_json(card)}};
     std::cout << result.dump(2) << '\n';
 }
 
 int run(const Options& options) {
-    if (options.output.empty() && !options.json) throw std::invalid_argument("report: -o FILE or --json is needed");
+    if (options.output.empty() && !options.json)
+        throw std::invalid_argument("report: -o FILE or --json is needed");
     const analysis::Limits limits =
         options.limits.empty() ? analysis::default_limits() : analysis::read_limits(options.limits);
     const analysis::Run run = analysis::load_run(options.recording, wanted_signals(options.recording));
@@ -66,7 +68,7 @@ int run(const Options& options) {
     if (!file) throw std::runtime_error(options.output + ": cannot be written");
     if (!options.json)
         std::cout << options.output << ": " << card.shifts.size() << " shifts, verdict "
-              << analysis::name(card.verdict) << '\n';
+                  << analysis::name(card.verdict) << '\n';
     return good;
 }
 
@@ -80,7 +82,8 @@ Command::Run declare(CLI::App& app) {
     return [options] { return run(*options); };
 }
 
-const Command command("report", "a recording as one self-contained HTML page, or its scorecard as JSON", declare);
+const Command command("report", "a recording as one self-contained HTML page, or its scorecard as JSON",
+                      declare);
 
 }  // namespace
 

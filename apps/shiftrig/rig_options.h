@@ -13,17 +13,17 @@ namespace shiftrig::cli {
 
 struct RigOptions {
     rig::Choices choices;
-    std::string pace = "wall";          // wall, lockstep, free
-    double factor = 1;                  // simulated per wall time
-    std::optional<double> duration_s;   // else the scenario's, else without end
-    std::int64_t catch_up = 100;        // [ticks]
-    std::string overrun = "skip";       // skip, abort
-    std::int64_t late_limit = 0;        // [ticks in a row]; 0: none
-    std::string when_late = "record";   // record, skip, abort
-    double answer_timeout_s = 1;        // lockstep
-    int priority = 80;                  // FIFO; 0: none
+    std::string pace = "wall";         // wall, lockstep, free
+    double factor = 1;                 // simulated per wall time
+    std::optional<double> duration_s;  // else the scenario's, else without end
+    std::int64_t catch_up = 100;       // [ticks]
+    std::string overrun = "skip";      // skip, abort
+    std::int64_t late_limit = 0;       // [ticks in a row]; 0: none
+    std::string when_late = "record";  // record, skip, abort
+    double answer_timeout_s = 1;       // lockstep
+    int priority = 80;                 // FIFO; 0: none
     std::vector<int> processors;
-    std::int64_t rehearsal = 60'000;    // [ticks] at most; 0: none
+    std::int64_t rehearsal = 60'000;  // [ticks] at most; 0: none
 
     void add_to(CLI::App& app);
     // Everything but MODEL, --scenario and --duration, for commands that bring those themselves.

@@ -80,8 +80,11 @@ struct Beside {
 
 Beside prepare(const RunOptions& options, const rig::Rig& rig, const rt::LoopSettings& loop) {
     Beside beside;
-    beside.recording_path = !options.record.empty() ? options.record : options.csv.empty() ? "" : options.csv + ".lcmlog";
-    if (!beside.recording_path.empty()) beside.recording = std::make_unique<io::RecordingWriter>(beside.recording_path);
+    beside.recording_path = !options.record.empty() ? options.record
+                            : options.csv.empty()   ? ""
+                                                    : options.csv + ".lcmlog";
+    if (!beside.recording_path.empty())
+        beside.recording = std::make_unique<io::RecordingWriter>(beside.recording_path);
     constexpr std::int64_t an_hour_of_ticks = 3'600'000;  // the collector takes what fits its memory of it
     beside.collector = std::make_unique<rig::Collector>(rig, std::min(loop.slots, an_hour_of_ticks));
     if (!options.trace.empty()) beside.trace = std::make_unique<rt::Trace>(std::size_t{200'000});
@@ -141,7 +144,8 @@ void run_loop(rig::Session& session, const RunOptions& options, LiveLine& live, 
         live.show();
         if (unanswered && !complained) {
             complained = true;
-            std::cerr << (live.shown() ? "\n" : "") << "lockstep: the controller has not answered for " << options.answer_timeout_s
+            std::cerr << (live.shown() ? "\n" : "") << "lockstep: the controller has not answered for "
+                      << options.answer_timeout_s
                       << " s (--answer-timeout); so long is waited for each command cycle\n";
         }
         if (controller)
@@ -159,7 +163,8 @@ bool finish(const RunOptions& options, Beside& beside) {
         whole = beside.recorded.error.empty();
         if (!whole) std::cerr << beside.recorded.error << '\n';
         if (beside.recorded.lost > 0)
-            std::cerr << beside.recording_path << ": " << beside.recorded.lost << " ticks were not kept: the disk did not keep up\n";
+            std::cerr << beside.recording_path << ": " << beside.recorded.lost
+                      << " ticks were not kept: the disk did not keep up\n";
     }
     if (!options.csv.empty()) {
         io::RecordingReader reader(beside.recording_path);
@@ -177,8 +182,9 @@ bool finish(const RunOptions& options, Beside& beside) {
 void print_summary(const rig::Rig& rig, const rig::Session& session, const analysis::Scorecard& scorecard) {
     const rt::LoopReport& report = session.report();
     const double wall = static_cast<double>(report.ended - report.began) * 1e-9;
-    std::printf("%lld ticks, %.6g s simulated in %.3g s (%.3g times real time)\n", static_cast<long long>(report.executed),
-                rig.sim_time(), wall, wall > 0 ? rig.sim_time() / wall : 0);
+    std::printf("%lld ticks, %.6g s simulated in %.3g s (%.3g times real time)\n",
+                static_cast<long long>(report.executed), rig.sim_time(), wall,
+                wall > 0 ? rig.sim_time() / wall : 0);
     std::cout << describe(report) << "rig tick  " << session.rig_time().percentiles() << '\n';
     if (session.command_to_signal().count() > 0)
         std::cout << "command → signal  " << session.command_to_signal().percentiles() << '\n';
@@ -198,7 +204,8 @@ int run(const RunOptions& options) {
         for (auto& refusal : prepare_thread(options)) refusals.push_back(std::move(refusal));
     }).join();
     rt::LoopSettings loop = options.loop(rig.setup());
-    if (loop.slots > 0) loop.slots = std::max<std::int64_t>(0, loop.slots - rig.ticks());  // a snapshot has done some
+    if (loop.slots > 0)
+        loop.slots = std::max<std::int64_t>(0, loop.slots - rig.ticks());  // a snapshot has done some
     std::optional<rig::SnapshotTaker> taker;
     if (options.snapshot_at.first >= 0) taker.emplace(rig, options.snapshot_at.first);
     Beside beside = prepare(options, rig, loop);
@@ -231,10 +238,12 @@ int run(const RunOptions& options) {
     controller.reset();
 
     const bool whole = finish(options, beside);
-    for (const auto& refusal : refusals) std::cerr << "this machine does not grant " << rt::to_string(refusal) << '\n';
+    for (const auto& refusal : refusals)
+        std::cerr << "this machine does not grant " << rt::to_string(refusal) << '\n';
     for (const auto& line : rig.buses().summary()) std::cerr << line << '\n';
     if (beside.collector->ticks_left_out() > 0)
-        std::cerr << "shifts are judged without the last " << beside.collector->ticks_left_out() << " ticks, which did not fit the memory\n";
+        std::cerr << "shifts are judged without the last " << beside.collector->ticks_left_out()
+                  << " ticks, which did not fit the memory\n";
 
     const auto& report = session.report();
     const analysis::Run collected = beside.collector->finish(rig);
@@ -249,7 +258,8 @@ int run(const RunOptions& options) {
     } else {
         print_summary(rig, session, scorecard);
     }
-    const bool ended_well = report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped;
+    const bool ended_well =
+        report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped;
     return whole && ended_well ? good : failed;
 }
 
@@ -259,11 +269,14 @@ Command::Run declare(CLI::App& app) {
     app.add_option("--record", options->record, "recording (an LCM log; .zst compresses)");
     app.add_option("--csv", options->csv, "every signal of every tick");
     app.add_option("--snapshot-at", options->snapshot_at, "copy the rig at this time [s] into this file");
-    app.add_option("--from", options->from, "go on from a snapshot; --duration counts from the start of its run");
+    app.add_option("--from", options->from,
+                   "go on from a snapshot; --duration counts from the start of its run");
     app.add_option("--can-log", options->choices.can_log, "candump log of everything on the first CAN bus");
-    app.add_option("--can-replay", options->choices.can_replay, "candump log that takes the controller's place, at its own times");
+    app.add_option("--can-replay", options->choices.can_replay,
+                   "candump log that takes the controller's place, at its own times");
     app.add_option("--trace", options->trace, "what the loop did when, for ui.perfetto.dev");
-    app.add_option("--controller-start", options->controller_start_s, "seconds a command given as --controller has to get ready")
+    app.add_option("--controller-start", options->controller_start_s,
+                   "seconds a command given as --controller has to get ready")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
     app.add_flag("--json", options->json, "end with one JSON object on standard output");

@@ -67,7 +67,8 @@ std::vector<std::size_t> by_duration(const std::vector<Case>& cases) {
     const auto duration = [&](std::size_t i) { return cases[i].scenario ? cases[i].scenario->duration : 0; };
     std::vector<std::size_t> order(cases.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return duration(a) > duration(b); });
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return duration(a) > duration(b); });
     return order;
 }
 

@@ -43,7 +43,8 @@ void fields(Fields& f, Calibration::Clutch& c) {
     using namespace io::rules;
     f.number("kiss_pressure_bar", c.kiss_pressure, positive, "torque begins here");
     f.number("torque_per_pressure_nm_per_bar", c.torque_per_pressure, positive, "sliding");
-    f.number("touch_pressure_bar", c.touch_pressure, positive, "a little above: holds the piston against the plates");
+    f.number("touch_pressure_bar", c.touch_pressure, positive,
+             "a little above: holds the piston against the plates");
     f.number("full_pressure_bar", c.full_pressure, positive, "in gear");
     f.number("fill_pressure_bar", c.fill_pressure, positive, "command while filling");
     f.number("filled_margin_bar", c.filled_margin, not_negative, "below the kiss point, counts as filled");
@@ -69,13 +70,16 @@ void fields(Fields& f, Calibration::Shift& s) {
 template <class Fields>
 void fields(Fields& f, Calibration::Launch& l) {
     using namespace io::rules;
-    f.choice("element", l.element, {{"gear_clutch", LaunchElement::gear_clutch}, {"main_clutch", LaunchElement::main_clutch}},
+    f.choice("element", l.element,
+             {{"gear_clutch", LaunchElement::gear_clutch}, {"main_clutch", LaunchElement::main_clutch}},
              "the clutch that slips");
     f.number("torque_nm", l.torque, positive, "greatest torque");
     f.number("torque_rate_nm_per_s", l.torque_rate, positive, "and how fast it rises");
-    f.number("engine_droop", l.engine_droop, efficiency, "the torque fades to 0 as the engine falls by this share");
+    f.number("engine_droop", l.engine_droop, efficiency,
+             "the torque fades to 0 as the engine falls by this share");
     f.number("timeout_s", l.timeout, positive, "then it is given up");
-    f.number("main_clutch_torque_nm", l.main_clutch_torque, positive, "capacity of the main clutch when closed");
+    f.number("main_clutch_torque_nm", l.main_clutch_torque, positive,
+             "capacity of the main clutch when closed");
     f.number("main_release_time_s", l.main_release_time, not_negative, "until the main clutch has opened");
     f.integer("highest_gear", l.highest_gear, gear_number, "to start off in from rest");
     f.number("highest_reversal_speed_rad_s", l.highest_reversal_speed, not_negative,
@@ -85,7 +89,8 @@ void fields(Fields& f, Calibration::Launch& l) {
 template <class Fields>
 void fields(Fields& f, Calibration::Choice& c) {
     using namespace io::rules;
-    f.number("upshift_torque_margin", c.upshift_torque_margin, positive, "share of full load an upshift may need");
+    f.number("upshift_torque_margin", c.upshift_torque_margin, positive,
+             "share of full load an upshift may need");
     f.number("auto_upshift_speed_rpm", c.auto_upshift_speed, positive, "least engine speed in the new gear");
     f.number("highest_engine_speed_rpm", c.highest_engine_speed, positive, "no downshift beyond it");
     f.number("lug_speed_rpm", c.lug_speed, positive, "below it at full load the engine lugs");
@@ -132,7 +137,9 @@ void fields(Fields& f, Calibration& c) {
     f.object("bus", c.bus, "conventions of the messages");
 }
 
-Calibration read_calibration(const std::string& path) { return parse_calibration(io::parse_yaml(io::read_text(path), path), path); }
+Calibration read_calibration(const std::string& path) {
+    return parse_calibration(io::parse_yaml(io::read_text(path), path), path);
+}
 
 Calibration parse_calibration(const YAML::Node& root, const std::string& path) {
     Calibration calibration;
@@ -145,12 +152,14 @@ Calibration parse_calibration(const YAML::Node& root, const std::string& path) {
 }
 
 double Calibration::pressure_for(double torque) const SHIFTRIG_REALTIME {
-    return std::clamp(clutch.kiss_pressure + torque / clutch.torque_per_pressure, clutch.touch_pressure, clutch.full_pressure);
+    return std::clamp(clutch.kiss_pressure + torque / clutch.torque_per_pressure, clutch.touch_pressure,
+                      clutch.full_pressure);
 }
 
 double Calibration::full_load(double engine_speed) const SHIFTRIG_REALTIME {
     const auto& curve = machine.full_load;
-    auto after = std::find_if(curve.begin(), curve.end(), [&](const auto& point) { return point.first > engine_speed; });
+    auto after = std::find_if(curve.begin(), curve.end(),
+                              [&](const auto& point) { return point.first > engine_speed; });
     if (after == curve.begin()) return curve.front().second;
     if (after == curve.end()) return curve.back().second;
     const auto& [x0, y0] = *(after - 1);

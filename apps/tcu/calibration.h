@@ -56,12 +56,12 @@ struct Calibration {
 
     struct Launch {
         LaunchElement element = LaunchElement::gear_clutch;
-        double torque = 0;             // greatest [Nm]
-        double torque_rate = 0;        // [Nm/s]
-        double engine_droop = 0;       // the torque fades to 0 as the engine falls by this fraction [1]
-        double timeout = 0;            // [s]
-        double main_clutch_torque = 0; // capacity of the main clutch when closed [Nm]
-        double main_release_time = 0;  // wait after opening the main clutch [s]
+        double torque = 0;                  // greatest [Nm]
+        double torque_rate = 0;             // [Nm/s]
+        double engine_droop = 0;            // the torque fades to 0 as the engine falls by this fraction [1]
+        double timeout = 0;                 // [s]
+        double main_clutch_torque = 0;      // capacity of the main clutch when closed [Nm]
+        double main_release_time = 0;       // wait after opening the main clutch [s]
         int highest_gear = 0;               // to start off in from rest
         double highest_reversal_speed = 0;  // of the powershift output against the wanted direction [rad/s]
     } launch;
@@ -86,22 +86,23 @@ struct Calibration {
     } stop;
 
     struct Limp {
-        double recovery_time = 0;   // signals must be alive for so long [s]
-        double slip = 0;            // apparent slip in gear at full pressure that is a fault [rad/s]
-        double slip_time = 0;       // for so long [s]
-        double sensor_zero = 0;     // a speed below this reads as lost [rad/s]
+        double recovery_time = 0;  // signals must be alive for so long [s]
+        double slip = 0;           // apparent slip in gear at full pressure that is a fault [rad/s]
+        double slip_time = 0;      // for so long [s]
+        double sensor_zero = 0;    // a speed below this reads as lost [rad/s]
     } limp;
 
     struct Bus {
         std::string mapping;  // what the frames of a CAN bus mean; read relative to this file
     } bus;
 
-    double pressure_for(double torque) const SHIFTRIG_REALTIME;      // touch pressure … full pressure [Pa]
-    double full_load(double engine_speed) const SHIFTRIG_REALTIME;   // [Nm]
+    double pressure_for(double torque) const SHIFTRIG_REALTIME;     // touch pressure … full pressure [Pa]
+    double full_load(double engine_speed) const SHIFTRIG_REALTIME;  // [Nm]
 };
 
 // Throws io::InputError naming file, line, key and rule.
 Calibration read_calibration(const std::string& path);
-Calibration parse_calibration(const YAML::Node& root, const std::string& path);  // `path` for messages and relative names
+Calibration parse_calibration(const YAML::Node& root,
+                              const std::string& path);  // `path` for messages and relative names
 
 }  // namespace shiftrig::tcu

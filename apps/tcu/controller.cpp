@@ -16,12 +16,24 @@ Commands Controller::step(const Sensors& s) SHIFTRIG_REALTIME {
         enter(Mode::limp);
     }
     switch (mode_) {
-        case Mode::listening: hold_as_found(s, c); break;
-        case Mode::neutral: neutral(s, c); break;
-        case Mode::launch: launch(s, c); break;
-        case Mode::driving: driving(s, c); break;
-        case Mode::shift: shift(s, c); break;
-        case Mode::limp: limp(s, c); break;
+        case Mode::listening:
+            hold_as_found(s, c);
+            break;
+        case Mode::neutral:
+            neutral(s, c);
+            break;
+        case Mode::launch:
+            launch(s, c);
+            break;
+        case Mode::driving:
+            driving(s, c);
+            break;
+        case Mode::shift:
+            shift(s, c);
+            break;
+        case Mode::limp:
+            limp(s, c);
+            break;
     }
     if (c.engine_speed_request == 0) c.engine_speed_request = give_back_engine(s);
     engine_request_ = c.engine_speed_request;
@@ -52,7 +64,8 @@ void Controller::listen(const Sensors& s) SHIFTRIG_REALTIME {
     enter(Mode::neutral);
     if (!s.pressures_alive) return;
     for (const int gear : {-1, 1, 2, 3, 4}) {
-        const bool pressed = s.pressure[static_cast<std::size_t>(clutch_of(gear))] > 0.8 * cal_->clutch.full_pressure;
+        const bool pressed =
+            s.pressure[static_cast<std::size_t>(clutch_of(gear))] > 0.8 * cal_->clutch.full_pressure;
         if (!pressed || std::abs(slip_of(*cal_, s, gear)) > cal_->limp.slip) continue;
         enter(Mode::driving);
         gear_ = gear;
@@ -98,7 +111,8 @@ void Controller::launch(const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
     const bool ready = fill_.done && (!by_main_clutch_ || in_mode_ >= launch.main_release_time);
     if (ready) {
         // The torque fades as the engine is drawn down, so that it settles where the engine can hold it.
-        const double fade = (s.engine_speed / launch_speed_ - (1 - launch.engine_droop)) / launch.engine_droop;
+        const double fade =
+            (s.engine_speed / launch_speed_ - (1 - launch.engine_droop)) / launch.engine_droop;
         launch_torque_ = std::min(launch_torque_ + launch.torque_rate * cal_->period,
                                   launch.torque * std::clamp(fade, 0.0, 1.0));
     }
@@ -114,7 +128,8 @@ void Controller::launch(const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
     if (ready && slip_.locked(*cal_, slip)) {
         enter(Mode::driving);
         choice_.shifted(*cal_, false);
-    } else if (s.lever * gear_ <= 0 || s.brake >= cal_->stop.brake_applied || s.parking_brake || would_stall(s)) {
+    } else if (s.lever * gear_ <= 0 || s.brake >= cal_->stop.brake_applied || s.parking_brake ||
+               would_stall(s)) {
         enter(Mode::neutral);
     } else if (in_mode_ > launch.timeout) {
         failed_lever_ = s.lever;
@@ -128,7 +143,8 @@ void Controller::driving(const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
     pressure_ = std::min(cal_->clutch.full_pressure, pressure_ + cal_->clutch.closing_rate * cal_->period);
     c.pressure[static_cast<std::size_t>(clutch_of(gear_))] = pressure_;
 
-    const bool slips = pressure_ >= cal_->clutch.full_pressure && std::abs(slip_of(*cal_, s, gear_)) > cal_->limp.slip;
+    const bool slips =
+        pressure_ >= cal_->clutch.full_pressure && std::abs(slip_of(*cal_, s, gear_)) > cal_->limp.slip;
     slipping_ = slips ? slipping_ + cal_->period : 0;
     const int next = choice_.next(*cal_, s, gear_);
     if (slipping_ > cal_->limp.slip_time) {
@@ -145,7 +161,8 @@ void Controller::driving(const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
 
 bool Controller::would_stall(const Sensors& s) const SHIFTRIG_REALTIME {
     const bool braking = s.brake >= cal_->stop.brake_applied || s.parking_brake;
-    return s.engine_speed + engine_slowing_ * cal_->stop.look_ahead < (braking ? cal_->stop.brake_speed : cal_->stop.stall_guard_speed);
+    return s.engine_speed + engine_slowing_ * cal_->stop.look_ahead <
+           (braking ? cal_->stop.brake_speed : cal_->stop.stall_guard_speed);
 }
 
 void Controller::watch_engine(const Sensors& s) SHIFTRIG_REALTIME {
@@ -195,9 +212,10 @@ double Controller::give_back_engine(const Sensors& s) SHIFTRIG_REALTIME {
 // sensor, not a slip.
 bool Controller::trusts(const Sensors& s) SHIFTRIG_REALTIME {
     if (!s.speeds_alive || !s.engine_alive || !s.lever_alive) return false;
-    if (gear_ == 0 || mode_ == Mode::launch || std::abs(slip_of(*cal_, s, gear_)) < cal_->limp.slip) return true;
-    const bool one_stands = std::abs(s.input_speed) < cal_->limp.sensor_zero ||
-                            std::abs(s.output_speed) < cal_->limp.sensor_zero;
+    if (gear_ == 0 || mode_ == Mode::launch || std::abs(slip_of(*cal_, s, gear_)) < cal_->limp.slip)
+        return true;
+    const bool one_stands =
+        std::abs(s.input_speed) < cal_->limp.sensor_zero || std::abs(s.output_speed) < cal_->limp.sensor_zero;
     return !one_stands;
 }
 

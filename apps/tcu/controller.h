@@ -60,21 +60,21 @@ class Controller {
     const Calibration* cal_;
     GearChoice choice_;
     Mode mode_ = Mode::listening;
-    int gear_ = 0;             // that is locked, or being launched in; 0 none
-    double in_mode_ = 0;       // time since the mode was entered [s]
-    double engine_speed_ = 0;  // in the last cycle [rad/s]
-    double engine_slowing_ = 0;// filtered, ≤ 0 [rad/s²]
-    double slipping_ = 0;      // slip in gear at full pressure for so long [s]
-    double trusted_ = 0;       // signals believable for so long [s]
-    int failed_lever_ = 0;     // where the lever stood when an engagement failed: not again until it moves
+    int gear_ = 0;               // that is locked, or being launched in; 0 none
+    double in_mode_ = 0;         // time since the mode was entered [s]
+    double engine_speed_ = 0;    // in the last cycle [rad/s]
+    double engine_slowing_ = 0;  // filtered, ≤ 0 [rad/s²]
+    double slipping_ = 0;        // slip in gear at full pressure for so long [s]
+    double trusted_ = 0;         // signals believable for so long [s]
+    int failed_lever_ = 0;       // where the lever stood when an engagement failed: not again until it moves
     Fill fill_;
     SlipWatch slip_;
-    bool by_main_clutch_ = false; // the launch slips the main clutch, else the gear's own
-    double launch_speed_ = 0;     // of the engine when the launch began [rad/s]
-    double launch_torque_ = 0;    // capacity asked for [Nm]
-    double pressure_ = 0;         // commanded to the gear's clutch in launch and driving [Pa]
-    double engine_request_ = 0;   // asked of the engine [rad/s]; 0: nothing
-    double engine_before_ = 0;    // its speed when the shift began, under the driver's throttle [rad/s]
+    bool by_main_clutch_ = false;  // the launch slips the main clutch, else the gear's own
+    double launch_speed_ = 0;      // of the engine when the launch began [rad/s]
+    double launch_torque_ = 0;     // capacity asked for [Nm]
+    double pressure_ = 0;          // commanded to the gear's clutch in launch and driving [Pa]
+    double engine_request_ = 0;    // asked of the engine [rad/s]; 0: nothing
+    double engine_before_ = 0;     // its speed when the shift began, under the driver's throttle [rad/s]
     Shift shift_;
 };
 

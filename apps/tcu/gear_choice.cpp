@@ -4,9 +4,13 @@ namespace shiftrig::tcu {
 
 namespace {
 
-double ratio(const Calibration& cal, int gear) { return cal.machine.ratio[static_cast<std::size_t>(clutch_of(gear))]; }
+double ratio(const Calibration& cal, int gear) {
+    return cal.machine.ratio[static_cast<std::size_t>(clutch_of(gear))];
+}
 
-void count_down(double& time, double period) { time = std::max(0.0, time - period); }
+void count_down(double& time, double period) {
+    time = std::max(0.0, time - period);
+}
 
 }  // namespace
 
@@ -47,7 +51,8 @@ int GearChoice::next(const Calibration& cal, const Sensors& s, int gear) const S
     return gear + 1;
 }
 
-bool GearChoice::engine_bears(const Calibration& cal, const Sensors& s, int from, int to) const SHIFTRIG_REALTIME {
+bool GearChoice::engine_bears(const Calibration& cal, const Sensors& s, int from,
+                              int to) const SHIFTRIG_REALTIME {
     const double step = ratio(cal, from) / ratio(cal, to);  // > 1 upwards
     return torque_ * step <= cal.choice.upshift_torque_margin * cal.full_load(s.input_speed / step);
 }

@@ -25,10 +25,10 @@ class GearChoice {
     bool engine_bears(const Calibration& cal, const Sensors& s, int from, int to) const SHIFTRIG_REALTIME;
 
     bool observed_ = false;
-    double torque_ = 0;        // filtered [Nm]
-    double lugging_ = 0;       // for so long [s]
-    double refused_for_ = 0;   // no upshift for so long [s]
-    double pause_ = 0;         // no shift at all for so long [s]
+    double torque_ = 0;       // filtered [Nm]
+    double lugging_ = 0;      // for so long [s]
+    double refused_for_ = 0;  // no upshift for so long [s]
+    double pause_ = 0;        // no shift at all for so long [s]
 };
 
 }  // namespace shiftrig::tcu

@@ -12,16 +12,16 @@ namespace shiftrig::tcu {
 
 // SI units; speeds signed, positive as the machine drives forward.
 struct Sensors {
-    double engine_speed = 0;  // [rad/s]
-    double disc_speed = 0;    // behind the main clutch [rad/s]
-    double input_speed = 0;   // powershift input [rad/s]
-    double output_speed = 0;  // powershift output [rad/s]
-    double engine_torque = 0; // net on the crankshaft [Nm]
+    double engine_speed = 0;                      // [rad/s]
+    double disc_speed = 0;                        // behind the main clutch [rad/s]
+    double input_speed = 0;                       // powershift input [rad/s]
+    double output_speed = 0;                      // powershift output [rad/s]
+    double engine_torque = 0;                     // net on the crankshaft [Nm]
     std::array<double, clutch_count> pressure{};  // measured [Pa]
-    int lever = 0;            // −1 reverse, 0 neutral, 1… forward
-    bool automatic = false;   // the lever is an upper bound
-    double brake = 0;         // pedal 0…1
-    double clutch_pedal = 0;  // 0…1
+    int lever = 0;                                // −1 reverse, 0 neutral, 1… forward
+    bool automatic = false;                       // the lever is an upper bound
+    double brake = 0;                             // pedal 0…1
+    double clutch_pedal = 0;                      // 0…1
     bool parking_brake = false;
     // What was heard lately; false when the message is missing or its content is not valid.
     bool speeds_alive = false, engine_alive = false, lever_alive = false, pressures_alive = false;
@@ -36,11 +36,13 @@ struct Commands {
     int current_gear = 0;                         // engaged
     int selected_gear = 0;                        // being engaged, or engaged
     bool shifting = false;
-    bool engaged = false;                         // the driveline passes torque
+    bool engaged = false;  // the driveline passes torque
     Mode mode = Mode::listening;
 };
 
-inline int clutch_of(int gear) { return gear < 0 ? reverse_clutch : gear - 1; }
+inline int clutch_of(int gear) {
+    return gear < 0 ? reverse_clutch : gear - 1;
+}
 
 // Slip of a gear's clutch, referred to the input [rad/s].
 inline double slip_of(const Calibration& cal, const Sensors& s, int gear) {

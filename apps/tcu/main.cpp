@@ -12,7 +12,9 @@ namespace {
 
 volatile std::sig_atomic_t stop = 0;
 
-void on_signal(int) { stop = 1; }
+void on_signal(int) {
+    stop = 1;
+}
 
 }  // namespace
 
@@ -22,8 +24,10 @@ int main(int argc, char** argv) {
     std::string bus, calibration_file = SHIFTRIG_CONFIG "/calibration/tractor.yaml";
     bool lockstep = false;
     app.add_option("--bus", bus, "can:INTERFACE | udpcan:ADDRESS:PORT | lcm:URL")->required();
-    app.add_option("--calibration", calibration_file, "what it believes about the machine")->capture_default_str();
-    app.add_flag("--lockstep", lockstep, "count time by the rig's questions, as fast as they come (the rig: --pace lockstep)");
+    app.add_option("--calibration", calibration_file, "what it believes about the machine")
+        ->capture_default_str();
+    app.add_flag("--lockstep", lockstep,
+                 "count time by the rig's questions, as fast as they come (the rig: --pace lockstep)");
     app.footer("Ends with SIGINT or SIGTERM. Exit codes: 0 good, 2 wrong usage or bad input.");
     CLI11_PARSE(app, argc, argv);
 

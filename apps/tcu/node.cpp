@@ -12,7 +12,8 @@ namespace {
 bus::Options options_for(const Calibration& calibration) {
     bus::Options options;
     options.role = bus::Role::controller;
-    options.tick_ns = std::llround(calibration.period * 1e9);  // everything that is due goes out with the commands
+    options.tick_ns =
+        std::llround(calibration.period * 1e9);  // everything that is due goes out with the commands
     return options;
 }
 
@@ -20,7 +21,8 @@ bus::Options options_for(const Calibration& calibration) {
 std::vector<int> statuses(const io::SignalTable& signals, std::initializer_list<const char*> messages) {
     std::vector<int> found;
     for (const char* message : messages)
-        if (const int index = signals.find(std::string("bus.") + message + ".status"); index >= 0) found.push_back(index);
+        if (const int index = signals.find(std::string("bus.") + message + ".status"); index >= 0)
+            found.push_back(index);
     return found;
 }
 
@@ -35,15 +37,20 @@ bool heard(const std::vector<int>& statuses, const io::SignalTable& signals) SHI
 
 }  // namespace
 
-Node::Node(const Calibration& calibration, const std::string& bus, const io::can::Mapping* mapping, bool lockstep)
-    : calibration_(calibration), controller_(calibration_), bus_(bus, mapping, signals_, options_for(calibration)),
+Node::Node(const Calibration& calibration, const std::string& bus, const io::can::Mapping* mapping,
+           bool lockstep)
+    : calibration_(calibration),
+      controller_(calibration_),
+      bus_(bus, mapping, signals_, options_for(calibration)),
       lockstep_(lockstep) {
     find_signals();
 }
 
 Node::Node(const Calibration& calibration, const std::string& bus, io::can::CanPort& port,
            const io::can::Mapping& mapping)
-    : calibration_(calibration), controller_(calibration_), bus_(bus, port, mapping, signals_, options_for(calibration)),
+    : calibration_(calibration),
+      controller_(calibration_),
+      bus_(bus, port, mapping, signals_, options_for(calibration)),
       lockstep_(false) {
     find_signals();
 }
@@ -51,7 +58,9 @@ Node::Node(const Calibration& calibration, const std::string& bus, io::can::CanP
 void Node::find_signals() {
     const auto at = [&](const std::string& name) {
         const int index = signals_.find(name);
-        if (index < 0) throw io::InputError(bus_.name() + ": the bus does not carry " + name + ", which the controller needs");
+        if (index < 0)
+            throw io::InputError(bus_.name() + ": the bus does not carry " + name +
+                                 ", which the controller needs");
         return index;
     };
     at_.engine_speed = at("sensor.engine.speed");

@@ -14,7 +14,8 @@ class Node {
   public:
     // In lockstep time is counted by the rig's questions, and `now_ns` ignored. Throws what bus::Bus throws, and
     // InputError if the bus does not carry what the controller needs.
-    Node(const Calibration& calibration, const std::string& bus, const io::can::Mapping* mapping, bool lockstep);
+    Node(const Calibration& calibration, const std::string& bus, const io::can::Mapping* mapping,
+         bool lockstep);
     // On an end of the in-process bus, where time is the rig's anyway.
     Node(const Calibration& calibration, const std::string& bus, io::can::CanPort& port,
          const io::can::Mapping& mapping);
@@ -46,7 +47,8 @@ class Node {
         std::array<int, clutch_count> pressure, pressure_command;
         int lever, automatic, brake, clutch_pedal, parking_brake;
         int main_release;
-        int selected_gear, current_gear, shift_in_process, limp, driveline_engaged;  // −1: the bus does not carry it
+        int selected_gear, current_gear, shift_in_process, limp,
+            driveline_engaged;  // −1: the bus does not carry it
         int told_input_speed, told_output_speed;
         int speed_request_enable, speed_request;
     };

@@ -18,11 +18,13 @@ void Shift::enter(Phase phase) SHIFTRIG_REALTIME {
 }
 
 void Shift::cancel() SHIFTRIG_REALTIME {
-    const bool offgoing_holds = phase_ == Phase::fill || (pulls_ && phase_ == Phase::torque && handed_over_ < 0.5);
+    const bool offgoing_holds =
+        phase_ == Phase::fill || (pulls_ && phase_ == Phase::torque && handed_over_ < 0.5);
     if (offgoing_holds) enter(Phase::abandoned);
 }
 
-double Shift::slipping_capacity(const Calibration& cal, const Sensors& s, double slip) const SHIFTRIG_REALTIME {
+double Shift::slipping_capacity(const Calibration& cal, const Sensors& s,
+                                double slip) const SHIFTRIG_REALTIME {
     const double to_go = std::max(cal.shift.inertia_time - in_phase_, cal.shift.shortest_to_go);
     const double acceleration = -slip_of(cal, s, to_) / to_go;  // of the input, towards its new speed
     const double torque = s.engine_torque - cal.machine.input_inertia * acceleration;
@@ -31,13 +33,15 @@ double Shift::slipping_capacity(const Calibration& cal, const Sensors& s, double
 
 double Shift::engine_speed_request(const Calibration& cal, const Sensors& s) const SHIFTRIG_REALTIME {
     const double new_speed = s.input_speed - slip_of(cal, s, to_);
-    const bool leads_upwards = !pulls_ && (phase_ == Phase::inertia || phase_ == Phase::torque || phase_ == Phase::closing) &&
-                               to_ < from_;
+    const bool leads_upwards =
+        !pulls_ && (phase_ == Phase::inertia || phase_ == Phase::torque || phase_ == Phase::closing) &&
+        to_ < from_;
     return leads_upwards ? new_speed + cal.shift.engine_lead : 0;
 }
 
 void Shift::step(const Calibration& cal, const Sensors& s, Commands& c) SHIFTRIG_REALTIME {
-    const auto on = static_cast<std::size_t>(clutch_of(to_)), off = static_cast<std::size_t>(clutch_of(from_));
+    const auto on = static_cast<std::size_t>(clutch_of(to_)),
+               off = static_cast<std::size_t>(clutch_of(from_));
     const double torque = std::abs(s.engine_torque);
     in_phase_ += cal.period;
 
@@ -64,7 +68,8 @@ void Shift::step(const Calibration& cal, const Sensors& s, Commands& c) SHIFTRIG
                 off_ = 0;
             } else {
                 on_ = cal.clutch.touch_pressure;
-                off_ = cal.pressure_for(slipping_capacity(cal, s, -on_slip));  // it slips towards the new speed
+                off_ =
+                    cal.pressure_for(slipping_capacity(cal, s, -on_slip));  // it slips towards the new speed
             }
             // A leading engine passes the new speed and must be caught there.
             const bool passed = !pulls_ && on_slip * first_slip_ <= 0;
@@ -79,7 +84,8 @@ void Shift::step(const Calibration& cal, const Sensors& s, Commands& c) SHIFTRIG
         }
         case Phase::closing:
             off_ = 0;
-            on_ = std::max(on_, cal.pressure_for(cal.shift.hold_margin * torque));  // it has locked: let it stay so
+            on_ = std::max(
+                on_, cal.pressure_for(cal.shift.hold_margin * torque));  // it has locked: let it stay so
             on_ = std::min(cal.clutch.full_pressure, on_ + cal.clutch.closing_rate * cal.period);
             if (on_ >= cal.clutch.full_pressure) enter(Phase::finished);
             break;

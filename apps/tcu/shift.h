@@ -45,12 +45,12 @@ class Shift {
     double slipping_capacity(const Calibration& cal, const Sensors& s, double slip) const SHIFTRIG_REALTIME;
 
     int from_ = 0, to_ = 0;
-    bool pulls_ = true;         // the oncoming clutch pulls; else the engine leads
-    double first_slip_ = 0;     // of the oncoming clutch when the shift began [rad/s]
+    bool pulls_ = true;      // the oncoming clutch pulls; else the engine leads
+    double first_slip_ = 0;  // of the oncoming clutch when the shift began [rad/s]
     Phase phase_ = Phase::finished;
-    double in_phase_ = 0;       // [s]
-    double on_ = 0, off_ = 0;   // commands [Pa]
-    double handed_over_ = 0;    // share of the torque phase that is done [1]
+    double in_phase_ = 0;      // [s]
+    double on_ = 0, off_ = 0;  // commands [Pa]
+    double handed_over_ = 0;   // share of the torque phase that is done [1]
     Fill fill_;
     SlipWatch slip_;
 };

@@ -172,9 +172,11 @@ struct CandumpLogger::Data {
         writer.join();
     }
     SHIFTRIG_TRUSTED_BEGIN  // try_enqueue never allocates
-    void note(std::int64_t now_ns, const Frame& frame, Direction direction) SHIFTRIG_REALTIME {
+        void
+        note(std::int64_t now_ns, const Frame& frame, Direction direction) SHIFTRIG_REALTIME {
         // What comes before time 0 (address claims) is logged as of then.
-        if (!queue.try_enqueue({frame, std::max<std::int64_t>(0, now_ns), direction})) lost.fetch_add(1, std::memory_order_relaxed);
+        if (!queue.try_enqueue({frame, std::max<std::int64_t>(0, now_ns), direction}))
+            lost.fetch_add(1, std::memory_order_relaxed);
     }
     SHIFTRIG_TRUSTED_END
     // Polls: the loop must not be burdened with waking somebody for a log.

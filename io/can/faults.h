@@ -60,7 +60,8 @@ struct BusFault {
 
 struct FaultPlan {
     std::uint64_t seed = 1;
-    double bit_rate = 0;  // [bit/s] of an in-process bus that takes its time, with arbitration; 0: it takes none
+    double bit_rate =
+        0;  // [bit/s] of an in-process bus that takes its time, with arbitration; 0: it takes none
     std::vector<BusFault> faults;
 };
 

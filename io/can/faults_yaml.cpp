@@ -33,7 +33,8 @@ class Reader {
         FaultPlan plan;
         if (node.IsMap()) {
             for (const auto& entry : node)
-                if (const auto key = entry.first.Scalar(); key != "seed" && key != "bit_rate" && key != "faults")
+                if (const auto key = entry.first.Scalar();
+                    key != "seed" && key != "bit_rate" && key != "faults")
                     fail(entry.first, "unknown key \"" + key + "\"");
             if (node["bit_rate"]) plan.bit_rate = number(node["bit_rate"], 1e3, 1e9);
             if (node["seed"]) plan.seed = static_cast<std::uint64_t>(number(node["seed"], 0, 9e15));

@@ -18,7 +18,8 @@ struct Frame {
     std::uint8_t length = 0;       // data bytes: 0…8, FD also 12, 16, 20, 24, 32, 48, 64
     std::array<std::uint8_t, 64> data{};
     std::int64_t timestamp_ns = 0;  // when it was on the bus, in the time of the port that received it
-    std::int64_t answers_ns = 0;    // sent: timestamp of the command that this frame is the first to reflect; 0: none
+    std::int64_t answers_ns =
+        0;  // sent: timestamp of the command that this frame is the first to reflect; 0: none
 
     // The same frame on the wire; when it was there does not matter.
     bool same_as(const Frame& other) const noexcept {

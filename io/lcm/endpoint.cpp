@@ -138,7 +138,8 @@ Endpoint::~Endpoint() {
     sem_destroy(&arrived_);
 }
 
-void Endpoint::take(const Listener& listener, const void* data, std::size_t size, std::int64_t arrived_us) noexcept {
+void Endpoint::take(const Listener& listener, const void* data, std::size_t size,
+                    std::int64_t arrived_us) noexcept {
     std::uint64_t fingerprint = 0;
     for (std::size_t i = 0; i < 8 && i < size; ++i)
         fingerprint = fingerprint << 8 | static_cast<const std::uint8_t*>(data)[i];

@@ -66,8 +66,8 @@ class Endpoint {
     // must live as long as the endpoint; `answers_ns`: arrival of the command that this message is the first to
     // reflect, 0 if of none. Loop only.
     SHIFTRIG_TRUSTED_BEGIN  // generated encoders of fixed-size types, and a post that wakes the send thread
-    template <class Type>
-    bool send(const char* channel, const Type& message, std::int64_t answers_ns = 0) SHIFTRIG_REALTIME {
+        template <class Type>
+        bool send(const char* channel, const Type& message, std::int64_t answers_ns = 0) SHIFTRIG_REALTIME {
         Outgoing* slot = outgoing_.claim();
         if (!slot) {
             send_dropped_.fetch_add(1, std::memory_order_relaxed);

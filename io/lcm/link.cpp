@@ -27,7 +27,8 @@ namespace {
 constexpr int messages_per_tick = 64;  // a flood of messages shall not hold up the loop
 
 SHIFTRIG_TRUSTED_BEGIN  // clock_gettime does not enter the kernel
-std::int64_t utime() SHIFTRIG_REALTIME {
+    std::int64_t
+    utime() SHIFTRIG_REALTIME {
     timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     return std::int64_t{now.tv_sec} * 1'000'000 + now.tv_nsec / 1000;
@@ -35,8 +36,8 @@ std::int64_t utime() SHIFTRIG_REALTIME {
 SHIFTRIG_TRUSTED_END
 
 SHIFTRIG_TRUSTED_BEGIN  // a generated decoder of fixed-size types; its hash was computed when the link was built
-template <class Type>
-void decode(const Message& bytes, Type& message) SHIFTRIG_REALTIME {
+    template <class Type>
+    void decode(const Message& bytes, Type& message) SHIFTRIG_REALTIME {
     message.decode(bytes.bytes.data(), 0, static_cast<int>(bytes.size));  // size and fingerprint are checked
 }
 SHIFTRIG_TRUSTED_END
@@ -114,7 +115,8 @@ struct LcmLink::Data {
     std::int64_t answered_ns = -1;   // and the simulated time at which that was asked; −1: none yet
     std::int64_t question_seq = -1;  // controller: newest speeds_t.seq seen
     std::int64_t rig_time_ns = 0;
-    std::int64_t command_arrived_ns = 0;  // rig: of the oldest command that no message sent reflects yet; 0: none
+    std::int64_t command_arrived_ns =
+        0;  // rig: of the oldest command that no message sent reflects yet; 0: none
 
     enum Inbound : std::size_t { at_command, at_engine, at_transmission, at_driver };  // rig
     enum Heard : std::size_t { at_speeds, at_driver_input };                           // controller

@@ -26,7 +26,8 @@ class LogPort final : public can::CanPort {
 
   private:
     SHIFTRIG_TRUSTED_BEGIN  // not in the loop: a recording is exported
-    void write(std::int64_t now_ns, const can::Frame& frame) SHIFTRIG_REALTIME {
+        void
+        write(std::int64_t now_ns, const can::Frame& frame) SHIFTRIG_REALTIME {
         line_.clear();
         can::append_candump_line(line_, frame, now_ns, "can0", direction_);
         std::fwrite(line_.data(), 1, line_.size(), file_);
@@ -65,11 +66,13 @@ std::int64_t export_candump(RecordingReader& reader, const std::string& path) {
     std::int64_t ticks = 0;
     for (RecordedTick tick; reader.next(tick); ++ticks) {
         auto at = table.value.begin();
-        for (const auto* part : {&tick.inputs, &tick.outputs, &tick.rig}) at = std::copy(part->begin(), part->end(), at);
+        for (const auto* part : {&tick.inputs, &tick.outputs, &tick.rig})
+            at = std::copy(part->begin(), part->end(), at);
         controller.send(tick.sim_time_ns, table);
         rig.send(tick.sim_time_ns, table);
     }
-    const bool failed = std::ferror(file) != 0 || (file == stdout ? std::fflush(file) : std::fclose(file)) != 0;
+    const bool failed =
+        std::ferror(file) != 0 || (file == stdout ? std::fflush(file) : std::fclose(file)) != 0;
     if (failed) throw RecordingError(path + ": cannot be written: " + std::strerror(errno));
     return ticks;
 }

@@ -23,7 +23,8 @@ struct Samples {
 void listen(const std::string& path, const can::Mapping& mapping, std::map<std::string, Samples>& all) {
     can::CandumpReplay replay(path, can::message_filters(mapping, can::Role::controller));
     SignalTable table;
-    can::CanLink link(mapping, replay, table, {.role = can::Role::controller, .address_claim = can::AddressClaim::off});
+    can::CanLink link(mapping, replay, table,
+                      {.role = can::Role::controller, .address_claim = can::AddressClaim::off});
     std::map<std::string, std::uint64_t> good;
     while (!replay.finished()) {
         const std::int64_t now_ns = replay.next_ns();
@@ -55,9 +56,11 @@ can::Mapping turned_round(can::Mapping mapping) {
 }
 
 double between(const Samples& samples, double time) {
-    const auto after = std::upper_bound(samples.time.begin(), samples.time.end(), time) - samples.time.begin();
+    const auto after =
+        std::upper_bound(samples.time.begin(), samples.time.end(), time) - samples.time.begin();
     const auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, after - 1));
-    if (after == 0 || samples.unit == plant::Unit::one || i + 1 >= samples.time.size()) return samples.value[i];
+    if (after == 0 || samples.unit == plant::Unit::one || i + 1 >= samples.time.size())
+        return samples.value[i];
     const double share = (time - samples.time[i]) / (samples.time[i + 1] - samples.time[i]);
     return samples.value[i] + share * (samples.value[i + 1] - samples.value[i]);
 }
@@ -81,7 +84,8 @@ FieldRecording read_field_candump(const std::string& path, const can::Mapping& o
     recording.path = path;
     double end = 0;
     for (const auto& [name, samples] : all) end = std::max(end, samples.time.back());
-    if (end < kRow) throw InputError(path, 0, 0, "holds no frames that " + mapping.file + " knows, or too few");
+    if (end < kRow)
+        throw InputError(path, 0, 0, "holds no frames that " + mapping.file + " knows, or too few");
     const auto rows = static_cast<std::size_t>(end / kRow);
     for (std::size_t row = 0; row <= rows; ++row) recording.time.push_back(kRow * static_cast<double>(row));
     for (const auto& [name, samples] : all) {

@@ -1,8 +1,7 @@
 #include "io/recording/manifest.h"
 
-#include <utility>
-
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "io/recording/checksum.h"
 

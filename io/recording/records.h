@@ -25,7 +25,14 @@ inline constexpr std::size_t signals_per_block = 64;
 inline constexpr std::size_t chunk_data_size = 2048;
 inline constexpr std::size_t largest_record = 2304;  // encoded bytes of a record_chunk_t, rounded up
 
-enum class ChunkKind : std::int32_t { manifest = 1, model = 2, scenario = 3, state = 4, assembly = 5, history = 6 };
+enum class ChunkKind : std::int32_t {
+    manifest = 1,
+    model = 2,
+    scenario = 3,
+    state = 4,
+    assembly = 5,
+    history = 6
+};
 
 inline constexpr std::size_t block_count(std::size_t signals) {
     return (signals + signals_per_block - 1) / signals_per_block;

@@ -38,7 +38,8 @@ struct Case {
     std::vector<std::string> broken() const { return broken_expectations(scenario, run, card); }
     io::SignalBound bound(double from, double until, double minimum, double maximum) const {
         io::SignalBound b;
-        b.quantity = {"mass.vehicle.speed_kmh", "mass.vehicle.speed", plant::Unit::metre_per_second, 1 / 3.6, 9, 3};
+        b.quantity = {
+            "mass.vehicle.speed_kmh", "mass.vehicle.speed", plant::Unit::metre_per_second, 1 / 3.6, 9, 3};
         b.window = {from, until};
         b.minimum = minimum / 3.6;
         b.maximum = maximum / 3.6;

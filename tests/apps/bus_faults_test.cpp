@@ -42,29 +42,57 @@ std::string faults_of(unsigned seed) {
     std::minstd_rand random(seed + 1);
     const auto below = [&random](unsigned bound) { return static_cast<unsigned>(random() % bound); };
     const auto unit = [&random] { return static_cast<double>(random() % 1000) / 1000; };
-    const auto one_of = [&](const auto& names) { return std::string(names[below(static_cast<unsigned>(std::size(names)))]); };
-    static constexpr std::array messages = {"ClutchCommandA", "ClutchCommandB", "ClutchCommandC", "ClutchFeedbackA",
-                                            "ShaftSpeedsA", "ShaftSpeedsB", "EEC1", "TC1"};
-    static constexpr std::array sealed = {"ClutchCommandA", "ClutchCommandB", "ClutchFeedbackA", "ShaftSpeedsB"};
-    std::string yaml = "{seed: " + std::to_string(seed) + (below(2) ? ", bit_rate: 250000" : "") + ", faults: [";
+    const auto one_of = [&](const auto& names) {
+        return std::string(names[below(static_cast<unsigned>(std::size(names)))]);
+    };
+    static constexpr std::array messages = {
+        "ClutchCommandA", "ClutchCommandB", "ClutchCommandC", "ClutchFeedbackA",
+        "ShaftSpeedsA",   "ShaftSpeedsB",   "EEC1",           "TC1"};
+    static constexpr std::array sealed = {"ClutchCommandA", "ClutchCommandB", "ClutchFeedbackA",
+                                          "ShaftSpeedsB"};
+    std::string yaml =
+        "{seed: " + std::to_string(seed) + (below(2) ? ", bit_rate: 250000" : "") + ", faults: [";
     const unsigned count = 1 + below(5);
     for (unsigned i = 0; i < count; ++i) {
         const double from = 3 * unit(), until = from + 0.01 + unit();
-        const std::string when = ", from_s: " + std::to_string(from) + ", until_s: " + std::to_string(until) + "}, ";
+        const std::string when =
+            ", from_s: " + std::to_string(from) + ", until_s: " + std::to_string(until) + "}, ";
         const std::string often = ", probability: " + std::to_string(0.001 + 0.999 * unit());
         const std::string what = ", message: " + one_of(messages), whole = ", message: " + one_of(sealed);
         switch (below(11)) {
-            case 0: yaml += "{fault: drop" + what + often + when; break;
-            case 1: yaml += "{fault: delay" + what + often + ", by_ms: " + std::to_string(1 + below(40)) + when; break;
-            case 2: yaml += "{fault: jitter" + often + ", by_ms: " + std::to_string(1 + below(15)) + when; break;
-            case 3: yaml += "{fault: duplicate" + often + when; break;
-            case 4: yaml += "{fault: reorder" + often + when; break;
-            case 5: yaml += "{fault: corrupt, bits: " + std::to_string(1 + below(4)) + often + when; break;
-            case 6: yaml += "{fault: freeze, message: ShaftSpeedsB, signal: PowershiftOutput" + when; break;
-            case 7: yaml += "{fault: wrong_counter" + whole + often + when; break;
-            case 8: yaml += "{fault: wrong_checksum" + whole + often + when; break;
-            case 9: yaml += "{fault: babble, id: " + std::to_string(below(1U << 29)) + ", rate_hz: " + std::to_string(100 + below(1900)) + when; break;
-            default: yaml += "{fault: bus_off" + when;
+            case 0:
+                yaml += "{fault: drop" + what + often + when;
+                break;
+            case 1:
+                yaml += "{fault: delay" + what + often + ", by_ms: " + std::to_string(1 + below(40)) + when;
+                break;
+            case 2:
+                yaml += "{fault: jitter" + often + ", by_ms: " + std::to_string(1 + below(15)) + when;
+                break;
+            case 3:
+                yaml += "{fault: duplicate" + often + when;
+                break;
+            case 4:
+                yaml += "{fault: reorder" + often + when;
+                break;
+            case 5:
+                yaml += "{fault: corrupt, bits: " + std::to_string(1 + below(4)) + often + when;
+                break;
+            case 6:
+                yaml += "{fault: freeze, message: ShaftSpeedsB, signal: PowershiftOutput" + when;
+                break;
+            case 7:
+                yaml += "{fault: wrong_counter" + whole + often + when;
+                break;
+            case 8:
+                yaml += "{fault: wrong_checksum" + whole + often + when;
+                break;
+            case 9:
+                yaml += "{fault: babble, id: " + std::to_string(below(1U << 29)) +
+                        ", rate_hz: " + std::to_string(100 + below(1900)) + when;
+                break;
+            default:
+                yaml += "{fault: bus_off" + when;
         }
     }
     return yaml.substr(0, yaml.size() - 2) + "]}";
@@ -77,7 +105,8 @@ struct Outcome {
 };
 
 Outcome run(unsigned seed) {
-    static constexpr std::array subjects = {"plough_upshift", "plough_downshift", "kick_down", "coast_downshift"};
+    static constexpr std::array subjects = {"plough_upshift", "plough_downshift", "kick_down",
+                                            "coast_downshift"};
     auto scenario = io::read_scenario(scenarios + subjects[seed % subjects.size()] + ".yaml");
     scenario.start.settle = std::min(scenario.start.settle, 2.0);
     scenario.bus_faults = YAML::Load(faults_of(seed));
@@ -98,10 +127,12 @@ Outcome run(unsigned seed) {
         records.add(r.state().bytes());
         for (const auto& event : r.plant_events()) {
             records.add(static_cast<double>(event.kind) + 256 * event.device);
-            for (const double number : {event.time, event.torque, event.capacity, event.slip}) records.add(number);
+            for (const double number : {event.time, event.torque, event.capacity, event.slip})
+                records.add(number);
         }
         outcome.safe_command = outcome.safe_command || r.value(r.own().safe_command) > 0;
-        for (const double number : r.output_values()) outcome.finite = outcome.finite && std::isfinite(number);
+        for (const double number : r.output_values())
+            outcome.finite = outcome.finite && std::isfinite(number);
     };
     Session(rig, std::move(options)).run();
     outcome.records = records.value;
@@ -114,12 +145,14 @@ TEST(BusFaults, LockstepRunsAreRepeatedBitForBitFromTheirSeeds) {
     int safe_commands = 0;
     for (int seed = first; seed < first + runs; ++seed) {
         const Outcome once = run(static_cast<unsigned>(seed)), again = run(static_cast<unsigned>(seed));
-        ASSERT_EQ(once.records, again.records) << "seed " << seed << ": " << faults_of(static_cast<unsigned>(seed));
+        ASSERT_EQ(once.records, again.records)
+            << "seed " << seed << ": " << faults_of(static_cast<unsigned>(seed));
         EXPECT_TRUE(once.finite) << "seed " << seed << ": " << faults_of(static_cast<unsigned>(seed));
         different.insert(once.records);
         safe_commands += once.safe_command;
     }
-    std::printf("%d runs, each twice: %zu different ones, the safe command acted in %d\n", runs, different.size(), safe_commands);
+    std::printf("%d runs, each twice: %zu different ones, the safe command acted in %d\n", runs,
+                different.size(), safe_commands);
     EXPECT_GE(different.size(), static_cast<std::size_t>(0.9 * runs)) << "seeds make a difference";
     EXPECT_GT(safe_commands, runs / 20);
     EXPECT_LT(safe_commands, runs);

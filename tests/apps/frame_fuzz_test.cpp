@@ -14,8 +14,9 @@ namespace {
 
 // Commands with and without a right seal, other messages of ours with any content, J1939's own groups, anything.
 io::can::Frame random_frame(std::mt19937& random) {
-    static constexpr std::uint32_t ours[] = {0x18FF1003, 0x18FF1103, 0x18FF1203, 0x0C000003, 0x0CF00203, 0x18F00503,
-                                             0x18EAFFF9, 0x18EA80F9, 0x18EEFF80, 0x1CECFF03, 0x1CEBFF03, 0x1CEC8003};
+    static constexpr std::uint32_t ours[] = {0x18FF1003, 0x18FF1103, 0x18FF1203, 0x0C000003,
+                                             0x0CF00203, 0x18F00503, 0x18EAFFF9, 0x18EA80F9,
+                                             0x18EEFF80, 0x1CECFF03, 0x1CEBFF03, 0x1CEC8003};
     io::can::Frame frame;
     frame.extended = random() % 10 != 0;
     frame.id = random() % 4 == 0 ? static_cast<std::uint32_t>(random()) : ours[random() % std::size(ours)];
@@ -25,7 +26,8 @@ io::can::Frame random_frame(std::mt19937& random) {
     for (std::size_t i = 0; i < 8; ++i) frame.data[i] = static_cast<std::uint8_t>(random());
     if (random() % 4 != 0) {
         const auto counter = static_cast<unsigned>(random() % 16);
-        frame.data[7] = static_cast<std::uint8_t>(counter | io::can::tsc1_checksum(frame.id, frame.data.data(), counter) << 4);
+        frame.data[7] = static_cast<std::uint8_t>(
+            counter | io::can::tsc1_checksum(frame.id, frame.data.data(), counter) << 4);
     }
     return frame;
 }
@@ -53,7 +55,8 @@ TEST(FrameFuzz, AMillionFramesLeaveThePlantFiniteAndTheTickWithoutAllocation) {
         }
         shifted = shifted || rig.plant_events().size() > 0;
         safe = safe || rig.value(rig.own().safe_command) > 0;
-        for (const double number : rig.output_values()) ASSERT_TRUE(std::isfinite(number)) << "at " << rig.sim_time();
+        for (const double number : rig.output_values())
+            ASSERT_TRUE(std::isfinite(number)) << "at " << rig.sim_time();
     }
     EXPECT_EQ(allocations, 0);
     EXPECT_TRUE(shifted) << "what was believed had consequences";

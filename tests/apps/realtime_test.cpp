@@ -85,7 +85,8 @@ class ControllerBeside {
   public:
     explicit ControllerBeside(const std::string& bus)
         : thread_([this, bus] {
-              const auto calibration = tcu::read_calibration(SHIFTRIG_SOURCE_DIR "/config/calibration/tractor.yaml");
+              const auto calibration =
+                  tcu::read_calibration(SHIFTRIG_SOURCE_DIR "/config/calibration/tractor.yaml");
               const auto mapping = io::can::read_mapping(calibration.bus.mapping);
               tcu::Node node(calibration, bus, &mapping, false);
               for (const rt::SteadyClock clock; !stop_;) {

@@ -14,11 +14,14 @@ namespace {
 
 const std::string config = SHIFTRIG_SOURCE_DIR "/config/";
 
-io::ScenarioFile scenario(const std::string& name) { return io::read_scenario(config + "scenarios/" + name + ".yaml"); }
+io::ScenarioFile scenario(const std::string& name) {
+    return io::read_scenario(config + "scenarios/" + name + ".yaml");
+}
 
 // A scenario in the words of a test; it stands where the others do.
 io::ScenarioFile inline_scenario(const std::string& text) {
-    return io::parse_scenario("model: ../tractor.yaml\nabout: a test\n" + text, config + "scenarios/inline.yaml");
+    return io::parse_scenario("model: ../tractor.yaml\nabout: a test\n" + text,
+                              config + "scenarios/inline.yaml");
 }
 
 constexpr const char* ploughing_in_f2 = R"(
@@ -89,17 +92,19 @@ TEST(Rig, TractorHeldOnASlopeCreepsLessThanANanometreInTenMinutes) {
     std::size_t stopped = 0;
     for (std::size_t i = 0; i < speed.size(); ++i)
         if (std::fabs(speed[i]) > 1e-3) stopped = i;
-    const auto begin = static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), time[stopped] + 60) - time.begin());
+    const auto begin = static_cast<std::size_t>(
+        std::lower_bound(time.begin(), time.end(), time[stopped] + 60) - time.begin());
     ASSERT_LT(begin, time.size());
     EXPECT_GT(time.back() - time[begin], 590);
-    const auto [least, most] = std::minmax_element(distance.begin() + static_cast<std::ptrdiff_t>(begin), distance.end());
+    const auto [least, most] =
+        std::minmax_element(distance.begin() + static_cast<std::ptrdiff_t>(begin), distance.end());
     EXPECT_LT(*most - *least, 1e-9);
     EXPECT_GT(column(result.run, "environment.grade").back(), 0.149);
 }
 
 TEST(Rig, SilentControllerLeadsToTheSafeCommandWithin150MillisecondsAndBackAgain) {
-    const auto result = run_scenario(inline_scenario(std::string(ploughing_in_f2) +
-                                                     "duration_s: 8\ncontroller: {silent: [{from_s: 1, until_s: 2}]}\n"));
+    const auto result = run_scenario(inline_scenario(
+        std::string(ploughing_in_f2) + "duration_s: 8\ncontroller: {silent: [{from_s: 1, until_s: 2}]}\n"));
     const auto& run = result.run;
     const auto& safe = column(run, "rig.safe_command");
     const auto& f2 = column(run, "clutch.F2.pressure_command");
@@ -124,7 +129,8 @@ TEST(Rig, SilentControllerLeadsToTheSafeCommandWithin150MillisecondsAndBackAgain
 }
 
 TEST(Rig, SameRunTwiceLeavesTheSameBits) {
-    const auto one = run_scenario(scenario("plough_upshift")), other = run_scenario(scenario("plough_upshift"));
+    const auto one = run_scenario(scenario("plough_upshift")),
+               other = run_scenario(scenario("plough_upshift"));
     ASSERT_EQ(one.run.columns.size(), other.run.columns.size());
     for (std::size_t c = 0; c < one.run.columns.size(); ++c) {
         if (one.run.columns[c].signal.name == "rig.tick_load") continue;  // what the machine took
@@ -175,7 +181,8 @@ TEST(Rig, WithoutAScenarioNothingIsRehearsed) {
 TEST(Rig, LockstepInOneProcessIsTheFreeRunBitForBit) {
     Choices lockstep;
     lockstep.lockstep = true;
-    const auto one = run_scenario(scenario("plough_upshift")), other = run_scenario(scenario("plough_upshift"), lockstep);
+    const auto one = run_scenario(scenario("plough_upshift")),
+               other = run_scenario(scenario("plough_upshift"), lockstep);
     EXPECT_EQ(other.report.unanswered, 0);
     for (const char* name : {"mass.vehicle.speed", "clutch.F3.torque", "clutch.F3.pressure_command"})
         EXPECT_EQ(column(one.run, name), column(other.run, name)) << name;
@@ -198,8 +205,9 @@ TEST(Rig, CommandThatIsNoNumberOrOutOfRangeIsLimitedAndNoted) {
 }
 
 TEST(Rig, PedalReleasesTheMainClutchWhateverTheControllerSays) {
-    const auto result = run_scenario(inline_scenario(
-        std::string(ploughing_in_f2) + "duration_s: 2\ntimeline:\n  - {at_s: 0.5, over_s: 0.1, driver.clutch_pedal: 1}\n"));
+    const auto result = run_scenario(
+        inline_scenario(std::string(ploughing_in_f2) +
+                        "duration_s: 2\ntimeline:\n  - {at_s: 0.5, over_s: 0.1, driver.clutch_pedal: 1}\n"));
     EXPECT_EQ(column(result.run, "clutch.Fc.release_command").back(), 1);
     EXPECT_LT(column(result.run, "clutch.Fc.capacity").back(), 1);  // [Nm]: the lag of the release never ends
     EXPECT_NE(column(result.run, "clutch.Fc.state").back(), 0);
@@ -208,11 +216,14 @@ TEST(Rig, PedalReleasesTheMainClutchWhateverTheControllerSays) {
 TEST(Rig, ScenarioThatSetsAnOutputIsRefusedWithItsPlace) {
     try {
         make_setup({}, inline_scenario("duration_s: 1\n"));
-        const auto wrong = inline_scenario("duration_s: 1\ntimeline:\n  - {at_s: 0.5, mass.vehicle.speed_kmh: 3}\n");
+        const auto wrong =
+            inline_scenario("duration_s: 1\ntimeline:\n  - {at_s: 0.5, mass.vehicle.speed_kmh: 3}\n");
         Rig rig(make_setup({}, wrong));
         FAIL() << "was accepted";
     } catch (const io::InputError& error) {
-        EXPECT_EQ(std::string(error.what()), config + "scenarios/inline.yaml:5:17: mass.vehicle.speed_kmh is an output; it cannot be set");
+        EXPECT_EQ(
+            std::string(error.what()),
+            config + "scenarios/inline.yaml:5:17: mass.vehicle.speed_kmh is an output; it cannot be set");
     }
 }
 

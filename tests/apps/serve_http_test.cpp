@@ -50,13 +50,14 @@ class Client {
 class Http : public testing::Test {
   protected:
     Handlers handlers() {
-        return {[] { return std::string(R"({"name":"test"})"); },
-                [this](std::string_view verb, const std::string& body) {
-                    ++commands;
-                    last = std::string(verb) + body;
-                    return std::string(verb == "input" ? "" : "no such command");
-                },
-                [this] { return recorded.empty() ? nullptr : std::make_unique<std::istringstream>(recorded); }};
+        return {
+            [] { return std::string(R"({"name":"test"})"); },
+            [this](std::string_view verb, const std::string& body) {
+                ++commands;
+                last = std::string(verb) + body;
+                return std::string(verb == "input" ? "" : "no such command");
+            },
+            [this] { return recorded.empty() ? nullptr : std::make_unique<std::istringstream>(recorded); }};
     }
     std::string host() const { return "Host: 127.0.0.1:" + std::to_string(server.port()) + "\r\n"; }
     std::string ask(const std::string& request) const {

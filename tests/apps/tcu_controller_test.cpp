@@ -33,7 +33,9 @@ struct Bench {
         s.speeds_alive = s.engine_alive = s.lever_alive = s.pressures_alive = true;
         cycle();
     }
-    static double ratio(int gear) { return calibration().machine.ratio[static_cast<std::size_t>(clutch_of(gear))]; }
+    static double ratio(int gear) {
+        return calibration().machine.ratio[static_cast<std::size_t>(clutch_of(gear))];
+    }
     double& pressure(int gear) { return s.pressure[static_cast<std::size_t>(clutch_of(gear))]; }
     double command(int gear) const { return c.pressure[static_cast<std::size_t>(clutch_of(gear))]; }
     void cycle(double seconds = 0.01) {
@@ -80,8 +82,9 @@ TEST(Controller, LeverOneUpHandsTheTorqueToTheNextClutch) {
     EXPECT_EQ(bench.command(2), 0);
     // The clutch that pulls carries the engine's torque and what slows the input's inertia, T + J Δω/t.
     const double slip = bench.s.input_speed - Bench::ratio(3) * bench.s.output_speed;
-    const double least = calibration().pressure_for(bench.s.engine_torque +
-                                                    calibration().machine.input_inertia * slip / calibration().shift.inertia_time);
+    const double least =
+        calibration().pressure_for(bench.s.engine_torque + calibration().machine.input_inertia * slip /
+                                                               calibration().shift.inertia_time);
     EXPECT_GE(bench.command(3), least * (1 - 1e-12));
     // The input runs at its new speed: the clutch is locked, and pressed to the full.
     bench.s.input_speed = bench.s.engine_speed = Bench::ratio(3) * bench.s.output_speed;
@@ -151,7 +154,8 @@ TEST(Controller, ShiftThatDoesNotComeToAnEndGivesTheOldGearBack) {
     bench.s.lever = 3;
     bench.cycle(0.02);
     bench.pressure(3) = calibration().clutch.kiss_pressure;
-    bench.cycle(calibration().shift.torque_time + calibration().shift.timeout + 0.5);  // the slip never vanishes
+    bench.cycle(calibration().shift.torque_time + calibration().shift.timeout +
+                0.5);  // the slip never vanishes
     EXPECT_EQ(bench.c.current_gear, 2);
     EXPECT_EQ(bench.command(3), 0);
     EXPECT_EQ(bench.command(2), calibration().clutch.full_pressure);

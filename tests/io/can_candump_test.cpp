@@ -150,7 +150,8 @@ TEST_F(CandumpFile, ALogInWallTimeBeginsWithItsFirstFrame) {
 }
 
 TEST_F(CandumpFile, ClaimingAddressesTakesNothingFromTheReplayAndIsLoggedAsOfTimeZero) {
-    std::ofstream(path_) << "(0.000000) vcan0 18FF1003#0000E02E00000760\n(0.200000) vcan0 18FF1003#0000E02E00000711\n";
+    std::ofstream(path_)
+        << "(0.000000) vcan0 18FF1003#0000E02E00000760\n(0.200000) vcan0 18FF1003#0000E02E00000711\n";
     const Mapping mapping = tractor_mapping();
     InProcessBus bus(2);
     CandumpReplay replay(path_, message_filters(mapping, Role::rig), &bus.end(0));

@@ -112,8 +112,8 @@ class FuzzedRig {
 inline void fuzz_frames(Bytes bytes) {
     struct Telling : FuzzedRig {
         ~Telling() {
-            std::fprintf(stderr, "%llu frames heard, %llu of them believed\n", static_cast<unsigned long long>(frames()),
-                         static_cast<unsigned long long>(good()));
+            std::fprintf(stderr, "%llu frames heard, %llu of them believed\n",
+                         static_cast<unsigned long long>(frames()), static_cast<unsigned long long>(good()));
         }
     };
     static Telling rig;

@@ -145,11 +145,13 @@ TEST(SocketCan, AnInterfaceThatIsLostWhileFramesAreSentIsSurvived) {
         const auto port = open_port("can:vcan7");
         std::atomic<bool> stop{false};
         std::thread sender([&] {
-            for (unsigned n = 0; !stop; ++n, std::this_thread::sleep_for(100us)) port->send(0, numbered(0x18FF1003, n));
+            for (unsigned n = 0; !stop; ++n, std::this_thread::sleep_for(100us))
+                port->send(0, numbered(0x18FF1003, n));
         });
         shell(i % 2 == 0 ? "ip link set vcan7 down" : "ip link del vcan7");
         EXPECT_TRUE(eventually([&] { return port->state() == PortState::down; }));
-        shell(i % 2 == 0 ? "ip link set vcan7 up" : "ip link add dev vcan7 type vcan && ip link set vcan7 up");
+        shell(i % 2 == 0 ? "ip link set vcan7 up"
+                         : "ip link add dev vcan7 type vcan && ip link set vcan7 up");
         EXPECT_TRUE(eventually([&] { return port->state() == PortState::up; }));
         shell("cansend vcan7 123#66");
         EXPECT_EQ(gather(*port, 1).size(), 1U);
@@ -164,7 +166,8 @@ TEST(SocketCan, AnInterfaceThatIsLostWhileFramesAreSentIsSurvived) {
 // A slow controller in miniature: a queue for three frames that lets 60 of them pass a second.
 TEST(SocketCan, FramesThatAFullQueueRefusesAreCountedAndNothingStops) {
     ASSERT_EQ(shell("ip link add dev vcan7 type vcan && ip link set vcan7 up && "
-                    "tc qdisc add dev vcan7 root tbf rate 8kbit burst 64b limit 64b"), "");
+                    "tc qdisc add dev vcan7 root tbf rate 8kbit burst 64b limit 64b"),
+              "");
     const auto port = open_port("can:vcan7"), watcher = open_port("can:vcan7");
     for (unsigned i = 0; i < 200; ++i) ASSERT_TRUE(port->send(0, numbered(0x18FF1003, i)));
     ASSERT_TRUE(eventually([&] {

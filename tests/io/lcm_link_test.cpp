@@ -98,7 +98,8 @@ TEST_F(Rig, TimeFromACommandToTheFirstMessageThatReflectsItIsTold) {
     std::this_thread::sleep_for(waits);
     const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
     link.send(now, table);
-    while (!link.next_command_latency(latency) && std::chrono::steady_clock::now() < patience) std::this_thread::yield();
+    while (!link.next_command_latency(latency) && std::chrono::steady_clock::now() < patience)
+        std::this_thread::yield();
     EXPECT_GE(latency, std::chrono::nanoseconds(waits).count());
     link.send(now + ms, table);
     ASSERT_TRUE(peer.wait(5'000 * ms));

@@ -11,7 +11,8 @@ int main(int argc, char** argv) {
     }
     namespace synthetic = shiftrig::io::synthetic;
     const bool small = std::string(argv[2]) == "small";
-    const auto summary = small ? synthetic::write_small(argv[1]) : synthetic::write(argv[1], std::atoi(argv[2]));
+    const auto summary =
+        small ? synthetic::write_small(argv[1]) : synthetic::write(argv[1], std::atoi(argv[2]));
     std::printf("%lld ticks, %lld bytes\n", static_cast<long long>(summary.ticks),
                 static_cast<long long>(summary.bytes));
     return summary.error.empty() && summary.lost == 0 ? 0 : 1;

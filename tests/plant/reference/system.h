@@ -35,7 +35,7 @@ double evaluate(const plant::Waveform& waveform, When when);
 struct Friction {
     std::string name;
     Vector column;
-    double nominal = 0;  // [Nm] weight of the device where a torque split is not unique
+    double nominal = 0;   // [Nm] weight of the device where a torque split is not unique
     double steepest = 0;  // of a friction table over the slip [Nm s/rad]
     bool initially_held = false;
     // Capacities [Nm] ≥ 0; sliding depends on |slip|.
