@@ -67,8 +67,9 @@ double first_knot(const Work& w) SHIFTRIG_REALTIME {
     double first = 1;
     for (const int k : w.model.tabled_pairs) {
         if (!slips(w.contact[k])) continue;
-        const double s0 = std::fabs(w.scratch.begin.slip[k]), sm = std::fabs(w.scratch.half.slip[k]),
-                     s1 = std::fabs(w.scratch.end.slip[k]);
+        const double s0 = std::fabs(w.scratch.begin.slip[k]), s1 = std::fabs(w.scratch.end.slip[k]);
+        // The engine for long chains has no stage half way.
+        const double sm = w.model.tree ? 0.5 * (s0 + s1) : std::fabs(w.scratch.half.slip[k]);
         for (const auto& [knot, factor] :
              *w.model.pair_laws[static_cast<std::size_t>(k)].friction.factor_over_slip) {
             if ((knot - s0) * (knot - s1) >= 0) continue;

@@ -1,5 +1,5 @@
 # The independent solver, its own proof, and what it proves about the plant.
-add_library(shiftrig_reference STATIC plant/reference/system.cpp plant/reference/modes.cpp plant/reference/solver.cpp
+add_library(shiftrig_reference STATIC plant/reference/system.cpp plant/reference/modes.cpp plant/reference/solver.cpp plant/reference/run.cpp
             plant/reference/linear_program.cpp plant/reference/cases.cpp plant/reference/curves.cpp plant/reference/tractor.cpp)
 target_link_libraries(shiftrig_reference PUBLIC shiftrig_options Eigen3::Eigen)
 
@@ -22,10 +22,12 @@ add_test(NAME tractor_shift_test COMMAND tractor_shift_test)
 
 add_executable(agreement_test plant/agreement_test.cpp)
 target_link_libraries(agreement_test PRIVATE shiftrig_comparison GTest::gtest_main)
+target_compile_definitions(agreement_test PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
 gtest_discover_tests(agreement_test)
 
 add_executable(library_examples_test plant/library_examples_test.cpp)
 target_link_libraries(library_examples_test PRIVATE shiftrig_comparison GTest::gtest_main)
+target_compile_definitions(library_examples_test PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
 gtest_discover_tests(library_examples_test)
 
 # Very many steps by hand: shiftrig_long_run --steps 100000000 --parked 10000000

@@ -17,6 +17,9 @@
 namespace shiftrig::reference {
 
 enum class Hold : std::int8_t { minus = -1, held = 0, plus = 1, free = 2 };
+inline double sign_of(Hold hold) {
+    return hold == Hold::plus ? 1 : hold == Hold::minus ? -1 : 0;
+}
 
 struct Mode {
     std::vector<Hold> friction;  // minus/plus: slipping with that sign
