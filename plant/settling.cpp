@@ -133,7 +133,9 @@ bool lean_on_losses(Work& w, const Mode& mode, const Use& most, Sample& s) SHIFT
             const bool agrees = (w.outputs.certificate.flags & 2) == 0;  // else it is no split of the torques
             w.outputs.certificate.flags |= flags;
             const double relieved = most_used(w, w.contact, s, piece).share;
-            if (!agrees || !leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
+            // Not so without a tree: there a loop at rest may be held by torques at the very kink of a mesh's losses, where
+            // neither direction agrees and both give nearly the same.
+            if ((mode.tree && !agrees) || !leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
             use = relieved;
             found = true;
             std::copy(trial, trial + m.contact_bytes, w.scratch.release.data());
