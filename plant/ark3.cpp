@@ -2,11 +2,12 @@
 //
 //   stage i:  p* = p0 + h Σ_{j<i} (a^I_ij N_j + a^E_ij Q_j),   ψ* = ψ0 + h Σ_{j<i} a^I_ij δ_j
 //             (M + hγ D + (hγ)² K) q_i = p* − hγ K ψ*
-//             δ_i = differences of q_i,  N_i = (M q_i − p*)/(hγ),  Q_i = Q(t0 + c_i h, q_i, a_i)
+//             N_i = (M q_i − p*)/(hγ),  Q_i = Q(t0 + c_i h, q_i, a_i)
 //   end:      p1 = p0 + h Σ b_j (N_j + Q_j),   ψ1 = ψ0 + h Σ b_j δ_j,   a1 = a0 + h Σ b_j ȧ_j
 //
-// K, D act on the differences along the tree's edges. Auxiliary states a (engine lag, boost, tyre slip) are not stiff
-// and go with the explicit table.
+// K, D act on the differences δ of q along the tree's edges. Auxiliary states a (engine lag, boost, tyre slip) are not stiff
+// and go with the explicit table. All of it is linear in the q_j, N_0 + Q_0 and Q_j, so these alone are kept: p* and N_i
+// are worked out from them when this is compiled.
 #include "plant/ark3.h"
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 
 #include "plant/contact.h"
 #include "plant/devices.h"
+#include "plant/few.h"
 #include "plant/modes.h"
 #include "plant/tree.h"
 
@@ -41,6 +43,39 @@ constexpr double embedded_error[stages] = {
     weights[0] - 2756255671327. / 12835298489170, weights[1] + 10771552573575. / 22201958757719,
     weights[2] - 9247589265047. / 10645013368117, gamma - 2193209047091. / 5459859503100};
 
+// A change of momentum as M Σ speed_j q_j + net · h (N_0 + Q_0) + Σ effort_j · h Q_j.
+struct Impulse {
+    double speed[stages] = {}, net = 0, effort[stages] = {};
+    constexpr void add(double factor, const Impulse& other) {
+        for (int j = 0; j < stages; ++j) {
+            speed[j] += factor * other.speed[j];
+            effort[j] += factor * other.effort[j];
+        }
+        net += factor * other.net;
+    }
+};
+struct Impulses {
+    Impulse star[stages];    // p*_i
+    Impulse torque[stages];  // h N_i
+};
+constexpr Impulses work_out_stages() {
+    Impulses all;
+    all.torque[0].net = 1;
+    all.torque[0].effort[0] = -1;
+    for (int i = 1; i < stages; ++i) {
+        Impulse& star = all.star[i];
+        star.speed[0] = 1;
+        for (int j = 0; j < i; ++j) {
+            star.add(implicit_table[i][j], all.torque[j]);
+            star.effort[j] += explicit_table[i][j];
+        }
+        all.torque[i].speed[i] = 1 / gamma;
+        all.torque[i].add(-1 / gamma, star);
+    }
+    return all;
+}
+constexpr Impulses impulses = work_out_stages();
+
 // Of a step of z' = L z: row · A^power · 1 goes with (hL)^(power + 1).
 constexpr double coefficient(const double (&row)[stages], int power) {
     double vector[stages] = {1, 1, 1, 1};
@@ -61,22 +96,78 @@ constexpr double coefficient(const double (&row)[stages], int power) {
 // enter both alike. So −(first/second) hL e takes the excess away.
 constexpr double excess = coefficient(weights, 3) - 1. / 24, embedded = coefficient(embedded_error, 2);
 
+// By what the embedded method differs: h Σ e_j (N_j + Q_j).
+constexpr Impulse embedded_impulse() {
+    Impulse sum;
+    for (int j = 0; j < stages; ++j) {
+        sum.add(embedded_error[j], impulses.torque[j]);
+        sum.effort[j] += embedded_error[j];
+    }
+    return sum;
+}
+constexpr Impulse swing_impulse = embedded_impulse();
+
+// What so many stages make of an impulse, and of the ways with these weights.
+StageSums stage_sums(const Impulse& impulse, const double (&ways)[stages], int count, const GroupState& begin,
+                     const TreeWork& v, double h) {
+    StageSums sums;
+    sums.count = count;
+    for (int j = 0; j < count; ++j) {
+        sums.speed[j] = j == 0 ? begin.speed : v.speed[j - 1];
+        sums.of_momentum[j] = impulse.speed[j];
+        sums.of_way[j] = h * ways[j];
+    }
+    sums.net = begin.net;
+    sums.of_net = h * impulse.net;
+    return sums;
+}
+
+void add_weighed_efforts(const TreeMode& t, const double (&shares)[stages], int count, const TreeWork& v,
+                         double h, double* momentum) {
+    double* __restrict sum = v.effort_sum;
+    const int forces = t.force_count;
+    for (int k = 0; k < forces; ++k) sum[k] = h * shares[0] * v.effort[0][k];
+    for (int j = 1; j < count; ++j) {
+        const double weight = h * shares[j];
+        const double* const effort = v.effort[j];
+        for (int k = 0; k < forces; ++k) sum[k] += weight * effort[k];
+    }
+    add_efforts(t, sum, momentum);
+}
+
+// The same on speeds.
+void add_speeds(const TreeMode& t, const double (&shares)[stages], const TreeWork& v, double h,
+                double* speed) {
+    for (int i = 0; i < t.force_count; ++i) {
+        double effort = 0;
+        for (int j = 0; j < stages; ++j) effort += shares[j] * v.effort[j][i];
+        effort *= h;
+        const GroupSlip& share = t.force_share[i];
+        for (int side = 0; side < 2; ++side) {
+            const int g = share.group[side];
+            speed[g] -= share.factor[side] * effort * t.inverse_mass[g];
+        }
+    }
+}
+
+void keep_efforts(const TreeMode& t, const Sample& s, double* effort) {
+    for (int i = 0; i < t.force_count; ++i) effort[i] = s.f[t.force[i]];
+}
+
 // Where shafts swing, makes the linear part of the step one of order 4. hL/(1 − hγL)² in place of hL: the same to that
 // order, nothing where hω is large, and the step stays L-stable. With S = (1 − hγL)⁻¹, which a stage solves with,
 // it is (S² − S)/γ.
 void complete_swing(const TreeKernel& kernel, const TreeMode& t, const TreeWork& v, double h,
-                    const double* inverse, const double* lower) {
-    const EmbeddedSums sums{
-        {h * embedded_error[0], h * embedded_error[1], h * embedded_error[2], h * embedded_error[3]},
-        {v.begin.torque, v.stage_torque[0], v.stage_torque[1], v.stage_torque[2]},
-        {v.begin.force, v.stage_force[0], v.stage_force[1], v.stage_force[2]},
-        {v.begin.rate, v.stage_rate[0], v.stage_rate[1], v.stage_rate[2]}};
-    const Swing swing = kernel.swing_error(t.paths, sums, v.end.speed);
+                    const StageMatrix& stage, const GroupState& begin, GroupState& end) {
+    const StageSums sums = stage_sums(swing_impulse, embedded_error, stages, begin, v, h);
+    double* const error = v.swing[0];
+    const Swing swing = kernel.swing_error(t.paths, sums, v.way, error);
     if (!(swing.error > ark3_swing_tolerance * h * std::max(swing.fastest, at_rest))) return;
-    const EmbeddedWork work{v.other.torque, v.right,       v.other.twist,
-                            v.other.speed,  v.other.force, v.other.rate};
+    kernel.combine(t.paths, sums, v.momentum, v.way);
+    add_weighed_efforts(t, swing_impulse.effort, stages, v, h, v.momentum);
     constexpr double factor = -excess / embedded / gamma;
-    kernel.correct(t.paths, sums, h * gamma, inverse, lower, factor, work, v.end.speed, v.end.twist);
+    kernel.correct(t.paths, stage, v.momentum, error, factor, {v.swing[1], v.swing[2], v.swing[3]}, end.speed,
+                   end.twist);
 }
 
 // The sample half way, for the search of the instant at which a locked pair gives way.
@@ -103,12 +194,6 @@ bool is_overloaded(const Work& w, const Sample& s) {
     return false;
 }
 
-// What the force laws need of z, from the groups' speeds.
-void show_speeds(const TreeMode& t, const double* speed, double* z) {
-    for (int i = 0; i < t.observed_count; ++i)
-        z[t.observed[i].mass] = t.observed[i].ratio * speed[t.observed[i].group];
-}
-
 void write_state(const ModelData& m, const TreeMode& t, const GroupState& s, double* z) {
     const TreeTopology& topology = *m.tree;
     for (int p = 0; p < m.masses; ++p)
@@ -125,82 +210,62 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     ScratchData& s = w.scratch;
     const TreeMode& t = *mode.tree;
     const TreeKernel& kernel = m.tree->kernel;
-    TreeWork v(m, s.workspace.data());
-    const Sample& begin = s.begin;
-    Sample &stage = s.late, &end = s.end;
+    const TreeWork v(m, s.workspace.data());
+    Sample &begin = s.begin, &late = s.late, &end = s.end;
     const double from = begin.at.fraction, length = end_fraction - from;
-    const double h = length * w.h, weight = h * ark3_gamma;
-    const double *inverse = t.inverse, *lower = t.lower;
+    const double h = length * w.h;
+    StageMatrix matrix{h * ark3_gamma, t.inverse, t.lower};
     if (from != 0 || end_fraction != 1) {
-        factor_stage(t, weight, v.inverse, v.lower);
-        inverse = v.inverse;
-        lower = v.lower;
+        factor_stage(t, matrix.weight, v.inverse, v.lower);
+        matrix.inverse = v.inverse;
+        matrix.lower = v.lower;
     }
 
     tabulate_contact(w, mode);
-    if (s.begin_groups != &mode) {
-        read_groups(m, t, begin.z, v.begin);
-        group_forces(t, begin.f, v.begin.force);
-        s.begin_groups = &mode;
-    }
-    for (int g = 0; g < t.paths.groups; ++g) v.momentum[g] = t.mass[g] * v.begin.speed[g];
-    std::copy(begin.auxiliary_rate, begin.auxiliary_rate + m.auxiliary, v.auxiliary[0]);
-
-    StageSums sums;
-    sums.torque[0] = v.begin.torque;
-    sums.force[0] = v.begin.force;
-    sums.rate[0] = v.begin.rate;
+    const GroupState& start = groups_of(w, mode, begin);
+    keep_efforts(t, begin, v.effort[0]);
+    copy_few(begin.auxiliary_rate, m.auxiliary, v.auxiliary[0]);
     for (int i = 1; i < stages; ++i) {
-        sums.count = i;
-        for (int j = 0; j < i; ++j) {
-            sums.implicit_weight[j] = h * implicit_table[i][j];
-            sums.explicit_weight[j] = h * explicit_table[i][j];
-        }
-        kernel.stage(t.paths, sums, v.momentum, v.begin.twist, weight, inverse, lower, v.right, v.star_twist,
-                     v.stage_speed, v.stage_rate[i - 1], v.stage_torque[i - 1]);
+        kernel.combine(t.paths, stage_sums(impulses.star[i], implicit_table[i], i, start, v, h), v.momentum,
+                       v.way);
+        add_weighed_efforts(t, impulses.star[i].effort, i, v, h, v.momentum);
+        double* const speed = v.speed[i - 1];
+        kernel.solve(t.paths, matrix, v.momentum, {start.twist, v.way}, speed);
 
         const bool last = i == stages - 1;
         const double fraction = last ? end_fraction : from + nodes[i] * length;
-        stage.at = {w.start + fraction * w.h, fraction, last ? Side::left : Side::right};
+        late.at = {w.start + fraction * w.h, fraction, last ? Side::left : Side::right};
         for (int a = 0; a < m.auxiliary; ++a) {
             double change = 0;
             for (int j = 0; j < i; ++j) change += explicit_table[i][j] * v.auxiliary[j][a];
-            stage.auxiliary[a] = begin.auxiliary[a] + h * change;
+            late.auxiliary[a] = begin.auxiliary[a] + h * change;
         }
-        show_speeds(t, v.stage_speed, stage.z);
-        tree_slips(m, mode, stage);
-        stage_forces(w, stage);
-        group_forces(t, stage.f, v.stage_force[i - 1]);
-        std::copy(stage.auxiliary_rate, stage.auxiliary_rate + m.auxiliary, v.auxiliary[i]);
-        sums.torque[i] = v.stage_torque[i - 1];
-        sums.force[i] = v.stage_force[i - 1];
-        sums.rate[i] = v.stage_rate[i - 1];
+        group_slips(m, mode, speed, late);
+        stage_forces(w, late);
+        keep_efforts(t, late, v.effort[i]);
+        copy_few(late.auxiliary_rate, m.auxiliary, v.auxiliary[i]);
     }
 
     // The implicit table ends with b: the last stage needs only what its explicit part lacks.
-    FinalSums final;
-    final.weight = weight;
-    for (int j = 0; j < stages; ++j) {
-        final.correction[j] = h * (weights[j] - explicit_table[stages - 1][j]);
-        final.force[j] = sums.force[j];
-    }
-    final.last_speed = v.stage_speed;
-    final.last_rate = v.stage_rate[stages - 2];
-    final.star_twist = v.star_twist;
-    kernel.finish(t.paths, final, v.end.speed, v.end.twist);
-    if (t.swings) complete_swing(kernel, t, v, h, inverse, lower);
-    kernel.shaft_torques(t.paths, v.end.speed, v.end.twist, v.end.rate, v.end.passed, v.end.torque);
+    GroupState& groups = end.groups;
+    kernel.finish(t.paths, {start.twist, v.way}, matrix.weight, v.speed[stages - 2], groups.speed,
+                  groups.twist);
+    double lacks[stages];
+    for (int j = 0; j < stages; ++j) lacks[j] = weights[j] - explicit_table[stages - 1][j];
+    add_speeds(t, lacks, v, h, groups.speed);
+    if (t.swings) complete_swing(kernel, t, v, h, matrix, start, groups);
     for (int a = 0; a < m.auxiliary; ++a) {
         double change = 0;
         for (int j = 0; j < stages; ++j) change += weights[j] * v.auxiliary[j][a];
         end.auxiliary[a] = begin.auxiliary[a] + h * change;
     }
-    write_state(m, t, v.end, end.z);
-    tree_slips(m, mode, end);
+    write_state(m, t, groups, end.z);
+    if (!t.exact) read_groups(t, end.z, groups);  // as the next step would, if it had to
+    group_slips(m, mode, groups.speed, end);
     end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
     end_forces(w, end);
-    group_forces(t, end.f, v.end.force);
-    s.torque_residual = rigid_torques(w, mode, v.end, end);
+    complete_groups(w, mode, end);
+    s.torque_residual = rigid_torques(w, mode, end);
     const double middle = 0.5 * (from + end_fraction);
     s.half.at = {w.start + middle * w.h, middle, Side::right};
     if (is_overloaded(w, end)) middle_sample(w, mode);
@@ -210,40 +275,25 @@ double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
     const TreeMode& t = *mode.tree;
-    TreeWork v(m, s.workspace.data());
-    const double h =
-        s.end.at.time - s.begin.at.time;  // begin's groups are those that advance_tree started from
-    const MiddleSums sums{h,
-                          {v.begin.speed, v.end.speed},
-                          {v.begin.torque, v.end.torque},
-                          {v.begin.force, v.end.force},
-                          {v.begin.rate, v.end.rate},
-                          t.loss,
-                          t.drag_loss};
-    const double loss = h / 6 * m.tree->kernel.middle(t.paths, sums, v.other.speed, v.other.rate);
+    const double h = s.end.at.time - s.begin.at.time;
+    const GroupState &begin = s.begin.groups, &end = s.end.groups;  // advance_tree() left them
+    GroupState& groups = s.middle.groups;
+    const MiddleSums sums{h,      {begin.speed, end.speed}, {begin.net, end.net}, {begin.rate, end.rate},
+                          t.loss, t.drag_loss};
+    const double loss = h / 6 * m.tree->kernel.middle(t.paths, sums, groups.speed, groups.rate);
     for (int i = 0; i < m.auxiliary; ++i) {
         s.middle.auxiliary[i] = 0.5 * (s.begin.auxiliary[i] + s.end.auxiliary[i]) +
                                 h / 8 * (s.begin.auxiliary_rate[i] - s.end.auxiliary_rate[i]);
     }
-    show_speeds(t, v.other.speed, s.middle.z);
-    tree_slips(m, mode, s.middle);
-    for (int j : m.translating) {
-        const int g = t.group[m.tree->position[static_cast<std::size_t>(j)]];
-        s.end.rate[j] = t.ratio[m.tree->position[static_cast<std::size_t>(j)]] *
-                        (v.end.torque[g] + v.end.force[g]) * t.inverse_mass[g];
-    }
+    group_slips(m, mode, groups.speed, s.middle);
     s.middle.at = s.half.at;
     stage_forces(w, s.middle);
     if (m.tree->lossy) {
         // Twists half way as well, for the torques of the gears.
-        for (int g = 0; g < t.paths.groups; ++g) {
-            v.other.twist[g] =
-                0.5 * (v.begin.twist[g] + v.end.twist[g]) + h / 8 * (v.begin.rate[g] - v.end.rate[g]);
-        }
-        m.tree->kernel.shaft_torques(t.paths, v.other.speed, v.other.twist, v.other.rate, v.other.passed,
-                                     v.other.torque);
-        group_forces(t, s.middle.f, v.other.force);
-        rigid_torques(w, mode, v.other, s.middle);
+        for (int g = 0; g < t.paths.groups; ++g)
+            groups.twist[g] = 0.5 * (begin.twist[g] + end.twist[g]) + h / 8 * (begin.rate[g] - end.rate[g]);
+        complete_groups(w, mode, s.middle);
+        rigid_torques(w, mode, s.middle);
     }
     return loss;
 }

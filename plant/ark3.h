@@ -17,8 +17,7 @@ inline constexpr double ark3_swing_tolerance = 1e-7, ark3_slow_swing = 2.8e-3;
 // and internal torques, and half where a locked pair is overloaded at the end.
 void advance_tree(Work& work, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME;
 
-// The middle sample of the part just computed, as book() of ledger.h needs it, by Hermite's cubic; also the acceleration
-// of translating masses at the end. Returns the energy lost in dampers of shafts and to the housing [J].
+// The middle sample of the part just computed, as book() of ledger.h needs it, by Hermite's cubic. Returns the energy lost in dampers of shafts and to the housing [J].
 double tree_middle(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

@@ -21,6 +21,7 @@ void load_sample(const ModelData& m, const double* block, double time, Sample& s
     std::copy(block + m.layout.auxiliary, block + m.layout.auxiliary + m.auxiliary, s.auxiliary);
     std::fill(s.torque, s.torque + m.torques, 0.);
     s.at = {time, 0, Side::right};
+    s.groups.mode = nullptr;
 }
 
 // Is the sample that the last step ended with the beginning of this one? Then its forces and torques are
@@ -43,7 +44,6 @@ void reset(Outputs& outputs, ScratchData& scratch, int forces) {
     scratch.told_events = 0;
     clear_few(scratch.work, scratch.work + forces);
     scratch.dissipated = scratch.input_work = 0;
-    scratch.begin_groups = nullptr;
     scratch.part_mode = nullptr;
 }
 
@@ -255,7 +255,6 @@ Work begin_look(const ModelData& m, OperatorsData& operators, const State& state
 void accept(Work& w) SHIFTRIG_REALTIME {
     std::swap(w.scratch.begin, w.scratch.end);
     w.scratch.begin.at.side = Side::right;
-    w.scratch.begin_groups = nullptr;
 }
 
 void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {

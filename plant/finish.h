@@ -25,6 +25,6 @@ Work begin_look(const ModelData& model, OperatorsData& operators, const State& s
 void finish_look(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
 // Output values from a sample and the State block (outputs.cpp).
-void fill_outputs(Work& work, const Mode& mode, const Sample& sample) SHIFTRIG_REALTIME;
+void fill_outputs(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

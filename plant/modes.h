@@ -124,6 +124,7 @@ struct OperatorsData {
     std::vector<Mode> modes;
     std::vector<TreeMode> trees;  // one per mode where the model has a tree
     std::vector<TreeMass> tree_masses;
+    std::vector<GroupSlip> group_slips;
     std::uint64_t clock = 0;
     const Mode* in_force = nullptr;             // not forgotten while other contact states are tried
     Mode* recent = nullptr;                     // the last one found,

@@ -99,10 +99,11 @@ void OperatorsData::place_trees(const ModelData& m) {
     integers.assign(modes.size() * sizes.integers, 0);
     bytes.assign(modes.size() * sizes.bytes, 0);
     tree_masses.resize(modes.size() * sizes.masses);
+    group_slips.resize(modes.size() * sizes.slips);
     for (std::size_t i = 0; i < modes.size(); ++i) {
         place_tree(m, trees[i], memory.data()->value + i * sizes.doubles,
                    integers.data() + i * sizes.integers, bytes.data() + i * sizes.bytes,
-                   tree_masses.data() + i * sizes.masses);
+                   tree_masses.data() + i * sizes.masses, group_slips.data() + i * sizes.slips);
         modes[i].tree = &trees[i];
     }
 }

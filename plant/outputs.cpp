@@ -9,16 +9,14 @@ namespace shiftrig::plant::detail {
 namespace {
 
 // Of a translating mass: those stand behind the torques of the mode's rows.
-double acceleration(Work& w, const Mode& mode, const Sample& s, std::size_t translating) {
-    if (!mode.tree) return s.active[static_cast<std::size_t>(mode.row_count) + translating];
-    Sample rates = s;
-    sample_rate(w, mode, rates);
-    return rates.rate[w.model.translating[translating]];
+double acceleration(Work& w, const Mode& mode, Sample& s, std::size_t translating) {
+    return mode.tree ? tree_acceleration(w, mode, s, w.model.translating[translating])
+                     : s.active[static_cast<std::size_t>(mode.row_count) + translating];
 }
 
 }  // namespace
 
-void fill_outputs(Work& w, const Mode& mode, const Sample& s) SHIFTRIG_REALTIME {
+void fill_outputs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const double* block = w.state;
     double* next = w.outputs.value.data();

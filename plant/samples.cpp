@@ -16,7 +16,8 @@ std::size_t sample_size(const ModelData& m) {
         static_cast<std::size_t>(whole_panels(m.seen) + whole_panels(m.torques + translating) +
                                  whole_panels(m.states_padded) + m.states + m.forces + 2 * m.auxiliary +
                                  m.pairs + 2 * whole_panels(m.pairs) + m.torques + loop_slack) +
-        2 * m.tyres.size() + 2 * m.converters.size() + 2 * m.engines.size();
+        2 * m.tyres.size() + 2 * m.converters.size() + 2 * m.engines.size() +
+        (m.tree ? group_state_size(m) : 0);
     return (doubles + panel_rows - 1) / panel_rows * panel_rows;
 }
 
@@ -46,6 +47,7 @@ void place_sample(const ModelData& m, Sample& s, double* memory) {
     s.converter = take(2 * m.converters.size());
     s.engine_torque = take(m.engines.size());
     s.engine_full_load = take(m.engines.size());
+    if (m.tree) place_groups(m, s.groups, memory);
 }
 
 ScratchData::ScratchData(const ModelData& m) {

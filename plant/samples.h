@@ -44,6 +44,7 @@ struct Sample {
     double* converter = nullptr;         // pump, turbine torque per converter [Nm]
     double* engine_torque = nullptr;     // per engine [Nm]
     double* engine_full_load = nullptr;  // at its speed [Nm]
+    GroupState groups;                   // on a tree
 };
 
 // The course of what presses a pair together, where it changes within the step.
@@ -99,7 +100,6 @@ struct ScratchData {
     std::vector<int> workspace_index;
     std::vector<int> piece;                         // per mass
     AlignedDoubles operator_memory, ledger_memory;  // operators of a partial step, of a part of one
-    const Mode* begin_groups = nullptr;             // mode in which the tree's begin.groups hold for `begin`
     int told_events = 0;                            // so many of this step's events are told in full
     bool turned = false;                            // power turned round in some mesh within the last part
     double torque_residual = 0;                     // of the tree's internal torques at `end`

@@ -15,6 +15,7 @@
 // capacities, which on a tree is the resistor network S λ = M̃, S = Ĉ W Ĉᵀ, M = W Ĉᵀ λ, again without fill.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -51,8 +52,6 @@ struct TreeTopology {
     std::vector<Ground> grounds;         // brakes and resistances
     std::vector<double> ground_damping;  // by position [Nm s/rad]
     std::vector<double> weight;          // by unknown: share of a torque that is not unique
-    std::vector<unsigned char>
-        read_by_laws;    // by position: its speed is read by engines, tyres, … or it translates
     bool lossy = false;  // any gear with losses
     TreeKernel kernel;
 };
@@ -60,12 +59,20 @@ struct TreeTopology {
 // The topology, or nothing, with `reason` saying which device makes it no forest.
 std::unique_ptr<TreeTopology> build_topology(const ModelData& model, std::string& reason);
 
-// A mass as the force laws or the torques of a mode see it.
+// A mass of a group with rigid devices inside.
 struct TreeMass {
-    int position = -1, mass = -1, group = -1;
-    double ratio = 0;    // r
+    int position = -1, group = -1;
     double inertia = 0;  // r J
     double drag = 0;     // r times its damping to the housing
+};
+
+// Σ factor q of two groups; the factor is 0 where there is only one.
+struct GroupSlip {
+    int group[2] = {};
+    double factor[2] = {};
+    double of(const double* speed) const noexcept {
+        return factor[0] * speed[group[0]] + factor[1] * speed[group[1]];
+    }
 };
 
 // One contact mode on the tree: arrays by position and by group, in one block of memory.
@@ -80,6 +87,7 @@ struct TreeMode {
     int* up = nullptr;
     int* path_begin = nullptr;
     int* path_parent = nullptr;
+    int* head = nullptr;
     int* run_begin = nullptr;
     int* run_parent = nullptr;
     unsigned char* grounded = nullptr;  // 1: held by a closed pair, 2: by a stuck mesh
@@ -99,14 +107,14 @@ struct TreeMode {
     double* speed_factor = nullptr;
     double* twist_factor = nullptr;
     double* twist_back = nullptr;  // 1/twist_factor
-    // Forces that can be other than 0 (not those of locked pairs), and what they do to one or two groups.
+    bool exact = false;            // all factors are ±1: there and back it is the same number
+    // Forces that can be other than 0 (not those of locked pairs): what they slip at, and what they take from one or two
+    // groups.
     int force_count = 0;
     int* force = nullptr;
-    int* force_group = nullptr;      // two each
-    double* force_factor = nullptr;  // two each, 0 where there is only one
-    // What the force laws read while a step is under way.
-    int observed_count = 0;
-    TreeMass* observed = nullptr;
+    GroupSlip* force_slip = nullptr;
+    GroupSlip* force_share = nullptr;  // factors r̂: the group's momentum changes by −factor · f
+    GroupSlip* turning = nullptr;      // per mesh, of what its loss acts on
     // Masses of groups with rigid devices inside, and the link torques that act on them.
     int inner_count = 0;
     TreeMass* inner = nullptr;
@@ -130,11 +138,11 @@ struct TreeMode {
 
 // Memory of one tree mode.
 struct TreeSizes {
-    std::size_t doubles = 0, integers = 0, bytes = 0, masses = 0;
+    std::size_t doubles = 0, integers = 0, bytes = 0, masses = 0, slips = 0;
     explicit TreeSizes(const ModelData& model);
 };
 void place_tree(const ModelData& model, TreeMode& tree, double* doubles, int* integers, unsigned char* bytes,
-                TreeMass* masses) noexcept;
+                TreeMass* masses, GroupSlip* slips) noexcept;
 
 // Fills mode.tree and what a mode says about itself (rows, bound, redundant) from mode.key.
 void build_tree_mode(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
@@ -151,35 +159,43 @@ void factor_stage(const TreeMode& tree, double weight, double* inverse, double* 
 
 // ---- motion of the groups -----------------------------------------------------------------------------
 
-// Speeds and twists of the groups at one instant, what the shafts and the other forces do to them.
+// The groups at the instant of a sample.
 struct GroupState {
     double* speed = nullptr;   // q
     double* twist = nullptr;   // ψ
     double* rate = nullptr;    // δ = ψ̇
     double* passed = nullptr;  // torque of the link to the parent, on the child
-    double* torque = nullptr;  // N, of all links and of damping to the housing
-    double* force = nullptr;   // Q, of everything else
+    double* net = nullptr;     // M q̇: of all links, of damping to the housing and of all other forces
+    // The mode in which they hold, as it was when so many had been built; none: they are not there.
+    const Mode* mode = nullptr;
+    std::int64_t modes_built = 0;
 };
+std::size_t group_state_size(const ModelData& model);  // in doubles
+void place_groups(const ModelData& model, GroupState& groups, double* memory);
 
 // Working memory of a step on the tree, in ScratchData::workspace.
 struct TreeWork {
-    GroupState begin, end, other;
-    double *momentum, *star_twist, *right, *stage_speed, *inverse, *lower;
-    double *stage_torque[3], *stage_force[3], *stage_rate[3];
+    double *momentum, *way, *inverse, *lower, *load, *potential, *speed[3], *swing[4];
+    double *effort[4], *effort_sum;  // by TreeMode::force: of the stages, and weighed together
     double* auxiliary[4];
-    double *load, *potential;
     TreeWork(const ModelData& model, double* memory) SHIFTRIG_REALTIME;
     static int doubles(const ModelData& model) noexcept;
 };
 
-// From a sample's z to q, ψ and all that follows from them; from its f to Q.
-void read_groups(const ModelData& model, const TreeMode& tree, const double* z,
-                 GroupState& groups) SHIFTRIG_REALTIME;
-void group_forces(const TreeMode& tree, const double* f, double* force) SHIFTRIG_REALTIME;
+// q and ψ from z.
+void read_groups(const TreeMode& tree, const double* z, GroupState& groups) SHIFTRIG_REALTIME;
+// What follows from them and from the sample's f.
+void complete_groups(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+// The sample's groups, read from its z and f if they are not there.
+const GroupState& groups_of(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+// Slips of forces and meshes from q.
+void group_slips(const ModelData& model, const Mode& mode, const double* speed,
+                 Sample& sample) SHIFTRIG_REALTIME;
+// Adds what these forces, in the order of TreeMode::force, give to the groups.
+void add_efforts(const TreeMode& tree, const double* effort, double* sum) SHIFTRIG_REALTIME;
 
-// Internal torques of the sample from its group state; returns their residual relative to the largest torque.
-double rigid_torques(const Work& work, const Mode& mode, const GroupState& groups,
-                     Sample& sample) SHIFTRIG_REALTIME;
+// Internal torques of the sample from its groups; returns their residual relative to the largest torque.
+double rigid_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
 // ---- the tree's versions of what the dense modes do with matrices (forces.h, transitions.h) ---------------
 
@@ -187,6 +203,7 @@ void tree_internal_torques(const Work& work, const Mode& mode, Sample& sample) S
 // Slips of forces and meshes from z.
 void tree_slips(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 void tree_sample_rate(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+double tree_acceleration(const Work& work, const Mode& mode, Sample& sample, int mass) SHIFTRIG_REALTIME;
 // ω̇ of impulses: change = B impulse.
 void tree_mobility(const Work& work, const Mode& mode, const double* impulse,
                    double* change) SHIFTRIG_REALTIME;

@@ -15,6 +15,9 @@ struct TreePaths {
     const int* begin = nullptr;   // of each path, and `groups` at the end
     const int* parent = nullptr;  // group that the head hangs on, −1: none
     const int* up = nullptr;      // parent of every group; roots, with L = 0, name group 0
+    // Heads that hang on another group than the one before them.
+    int hanging = 0;
+    const int* head = nullptr;
     // Paths with the roots behind them, whose L of 0 ends no chain of operations: what the solutions follow. The same fields.
     int run_count = 0;
     const int* run_begin = nullptr;
@@ -22,9 +25,10 @@ struct TreePaths {
     bool long_runs = false;  // worth following; short ones run into each other by themselves
     const double* mass = nullptr;
     const double* inverse_mass = nullptr;  // 0 where grounded
+    bool drags = false;                    // some group is damped to the housing
     const double* drag = nullptr;
-    const double* stiffness = nullptr;
-    const double* damping = nullptr;
+    const double* stiffness = nullptr;  // of the link to the parent; 0 at roots and behind the last group
+    const double* damping = nullptr;    // likewise
 };
 
 // Differences δ along the shafts, their torques `passed` on the child (with the sign of ψ), and N = −(K ψ + D δ) on the
@@ -32,61 +36,62 @@ struct TreePaths {
 using ShaftTorques = void (*)(const TreePaths&, const double* speed, const double* twist, double* rate,
                               double* passed, double* torque) SHIFTRIG_REALTIME;
 
-// Σ of what the stages so far contribute; terms j = 0 … count − 1.
+// What the speeds of the stages so far make of momenta, M Σ of_momentum_j q_j + of_net · net, and of the ways that groups
+// turn, Σ of_way_j q_j.
 struct StageSums {
     int count = 0;
-    double implicit_weight[4], explicit_weight[4];  // times h
-    const double *torque[4], *force[4], *rate[4];
+    const double* speed[4] = {};
+    double of_momentum[4] = {}, of_way[4] = {};
+    const double* net = nullptr;  // M q̇ at the beginning
+    double of_net = 0;
 };
+using Combine = void (*)(const TreePaths&, const StageSums&, double* momentum, double* way) SHIFTRIG_REALTIME;
 
-// One implicit stage: from the sums to speeds, δ and N of the stage. `weight` = hγ.
-using Stage = void (*)(const TreePaths&, const StageSums&, const double* momentum, const double* twist,
-                       double weight, const double* inverse, const double* lower, double* work,
-                       double* star_twist, double* speed, double* rate, double* torque) SHIFTRIG_REALTIME;
-
-// End of the step: speeds and twists from the last stage.
-struct FinalSums {
-    double weight = 0;     // hγ
-    double correction[4];  // h (b_j − a^E_4j); the last one h γ
-    const double* force[4];
-    const double* last_speed = nullptr;
-    const double* last_rate = nullptr;
-    const double* star_twist = nullptr;
+// Twists ψ + share · (differences of `way`).
+struct Twists {
+    const double *twist = nullptr, *way = nullptr;
+    double share = 1;
 };
-using FinishStages = void (*)(const TreePaths&, const FinalSums&, double* speed,
-                              double* twist) SHIFTRIG_REALTIME;
+// One implicit stage: q of (M + hγ D + (hγ)² K) q = momentum − hγ K twists, with the weight hγ.
+struct StageMatrix {
+    double weight = 0;
+    const double *inverse = nullptr, *lower = nullptr;  // 1/D, L
+};
+using Solve = void (*)(const TreePaths&, const StageMatrix&, const double* momentum, const Twists&,
+                       double* speed) SHIFTRIG_REALTIME;
+
+// Twists at the end of the step, `way` without what the last stage gives to it; a copy of its speeds.
+using FinishStages = void (*)(const TreePaths&, const Twists&, double weight, const double* last_speed,
+                              double* speed, double* twist) SHIFTRIG_REALTIME;
 
 // Speeds half way, from Hermite's cubic; Σ loss (δ0² + 4 δm² + δ1²) + drag_loss (q0² + 4 qm² + q1²).
 struct MiddleSums {
     double h = 0;
-    const double *speed[2], *torque[2], *force[2], *rate[2];  // at the beginning and the end
+    const double *speed[2], *net[2], *rate[2];  // at the beginning and the end
     const double *loss = nullptr, *drag_loss = nullptr;
 };
 using Middle = double (*)(const TreePaths&, const MiddleSums&, double* speed, double* rate) SHIFTRIG_REALTIME;
 
-// e = Σ weight_j (N_j + Q_j; δ_j) of momenta and twists: by what the embedded method differs.
-struct EmbeddedSums {
-    double weight[4];
-    const double *torque[4], *force[4], *rate[4];
-};
-
-// The largest e of a twist [rad], and the largest speed [rad/s].
+// The largest difference e of a twist from that of the embedded method [rad], and the largest speed [rad/s].
 struct Swing {
     double error = 0, fastest = 0;
 };
-using SwingError = Swing (*)(const TreePaths&, const EmbeddedSums&, const double* speed) SHIFTRIG_REALTIME;
+// With e as the differences of Σ of_way_j q_j, left in `twist`.
+using SwingError = Swing (*)(const TreePaths&, const StageSums&, double* way,
+                             double* twist) SHIFTRIG_REALTIME;
 
-// Adds factor (S² − S) e to speeds and twists: S = (1 − hγL)⁻¹ of the linear part L is what a stage solves with.
-struct EmbeddedWork {
-    double *momentum, *passed, *twist, *first, *second, *rate;
+// Adds factor (S² − S) e to speeds and twists, e = (momentum; error): S = (1 − hγL)⁻¹ of the linear part L is what a stage
+// solves with. Leaves nothing of `momentum`.
+struct SwingWork {
+    double *first, *second, *rate;
 };
-using Correct = void (*)(const TreePaths&, const EmbeddedSums&, double weight, const double* inverse,
-                         const double* lower, double factor, const EmbeddedWork&, double* speed,
-                         double* twist) SHIFTRIG_REALTIME;
+using Correct = void (*)(const TreePaths&, const StageMatrix&, double* momentum, const double* error,
+                         double factor, const SwingWork&, double* speed, double* twist) SHIFTRIG_REALTIME;
 
 struct TreeKernel {
     ShaftTorques shaft_torques = nullptr;
-    Stage stage = nullptr;
+    Combine combine = nullptr;
+    Solve solve = nullptr;
     FinishStages finish = nullptr;
     Middle middle = nullptr;
     SwingError swing_error = nullptr;

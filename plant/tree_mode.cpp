@@ -13,14 +13,15 @@ TreeSizes::TreeSizes(const ModelData& m) {
     const auto n = static_cast<std::size_t>(m.masses) + 1;
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
     const auto forces = static_cast<std::size_t>(m.forces);
-    doubles = 20 * n + grounds + 2 * forces;
-    integers = 15 * n + 2 * grounds + 3 * forces;
+    doubles = 20 * n + grounds;
+    integers = 16 * n + 2 * grounds + forces;
     bytes = (n + 7) / 8 * 8;
-    masses = 2 * n;
+    masses = n;
+    slips = 2 * forces + static_cast<std::size_t>(m.meshes);
 }
 
 void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers, unsigned char* bytes,
-                TreeMass* masses) noexcept {
+                TreeMass* masses, GroupSlip* slips) noexcept {
     const auto n = static_cast<std::size_t>(m.masses) + 1;
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
     for (double** array :
@@ -32,8 +33,8 @@ void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers,
     }
     t.end_factor = doubles;  // two ends of every link
     t.ground_factor = t.end_factor + 2 * n;
-    for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.run_begin,
-                        &t.run_parent, &t.speed_slot, &t.twist_slot, &t.up}) {
+    for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.head,
+                        &t.run_begin, &t.run_parent, &t.speed_slot, &t.twist_slot, &t.up}) {
         *array = integers;
         integers += n;
     }
@@ -42,11 +43,11 @@ void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers,
     t.ground_position = t.end_position + 2 * n;
     t.ground_unknown = t.ground_position + grounds;
     t.force = t.ground_unknown + grounds;
-    t.force_group = t.force + m.forces;
-    t.force_factor = t.ground_factor + grounds;
     t.grounded = bytes;
-    t.observed = masses;
-    t.inner = masses + n;
+    t.inner = masses;
+    t.force_slip = slips;
+    t.force_share = slips + m.forces;
+    t.turning = t.force_share + m.forces;
 }
 
 namespace {
@@ -114,18 +115,21 @@ void weigh_groups(const ModelData& m, const Mode& mode, TreeMode& t) {
         t.drag_loss[g] += t.ratio[p] * t.ratio[p] * topology.ground_damping[i];
     }
     for (int g = 0; g < groups; ++g) t.inverse_mass[g] = t.grounded[g] ? 0 : 1 / t.mass[g];
+    t.stiffness[groups] = t.damping[groups] = 0;
+    t.paths.drags = std::any_of(t.drag, t.drag + groups, [](double drag) { return drag != 0; });
 }
 
 // Paths of groups whose parent is the group before them.
 void find_paths(TreeMode& t) {
     TreePaths& paths = t.paths;
-    paths.count = paths.run_count = 0;
+    paths.count = paths.run_count = paths.hanging = 0;
     for (int g = 0; g < paths.groups; ++g) {
         if (g > 0 && t.parent[g] == g - 1) continue;
         if (g == 0 || t.parent[g] >= 0) {
             t.run_begin[paths.run_count] = g;
             t.run_parent[paths.run_count++] = t.parent[g];
         }
+        if (t.parent[g] >= 0) t.head[paths.hanging++] = g;
         t.path_begin[paths.count] = g;
         t.path_parent[paths.count++] = t.parent[g];
     }
@@ -138,6 +142,7 @@ void find_paths(TreeMode& t) {
     paths.long_runs = paths.groups > 12 * paths.run_count;
     paths.begin = t.path_begin;
     paths.parent = t.path_parent;
+    paths.head = t.head;
     paths.mass = t.mass;
     paths.inverse_mass = t.inverse_mass;
     paths.drag = t.drag;
@@ -145,38 +150,27 @@ void find_paths(TreeMode& t) {
     paths.damping = t.damping;
 }
 
-// Which masses are read during a step, and which carry rigid devices.
-void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
+// Which masses carry rigid devices, and where q and ψ stand in z.
+void find_masses(const ModelData& m, TreeMode& t) {
     const TreeTopology& topology = *m.tree;
-    enum : unsigned char { read = 1, rigid = 2 };
-    unsigned char* marks = reinterpret_cast<unsigned char*>(t.network_lower);  // not yet in use
-    std::copy(topology.read_by_laws.begin(), topology.read_by_laws.end(), marks);
-    for (int k = 0; k < m.pairs; ++k) {
-        if (mode.key[k]) continue;
-        for (const Link& link : m.structure.pairs[static_cast<std::size_t>(k)].links) {
-            if (link.mass >= 0) marks[topology.position[static_cast<std::size_t>(link.mass)]] |= read;
+    unsigned char* rigid = reinterpret_cast<unsigned char*>(t.network_lower);  // not yet in use
+    std::fill(rigid, rigid + m.masses, static_cast<unsigned char>(0));
+    for (int e = 0; e < t.edge_count; ++e)
+        rigid[t.edge[e]] = rigid[topology.edges[static_cast<std::size_t>(t.edge[e])].parent] = 1;
+    for (int p = 0; p < m.masses; ++p) {
+        if (t.grounded[t.group[p]]) rigid[p] = 1;
+    }
+    t.inner_count = t.end_count = 0;
+    for (int p = 0; p < m.masses; ++p) {
+        const auto i = static_cast<std::size_t>(p);
+        if (rigid[p]) {
+            t.inner[t.inner_count++] = {
+                p, t.group[p],
+                t.ratio[p] * m.structure.inertia[static_cast<std::size_t>(topology.mass[i])],
+                t.ratio[p] * topology.ground_damping[i]};
         }
     }
-    for (int e = 0; e < t.edge_count; ++e) {
-        marks[t.edge[e]] |= rigid;
-        marks[topology.edges[static_cast<std::size_t>(t.edge[e])].parent] |= rigid;
-    }
-    for (int p = 0; p < m.masses; ++p) {
-        if (t.grounded[t.group[p]]) marks[p] |= rigid;
-    }
-    t.observed_count = t.inner_count = t.end_count = 0;
-    for (int p = 0; p < m.masses; ++p) {
-        if (!marks[p]) continue;
-        const int mass = topology.mass[static_cast<std::size_t>(p)];
-        const TreeMass entry{p,
-                             mass,
-                             t.group[p],
-                             t.ratio[p],
-                             t.ratio[p] * m.structure.inertia[static_cast<std::size_t>(mass)],
-                             t.ratio[p] * topology.ground_damping[static_cast<std::size_t>(p)]};
-        if (marks[p] & read) t.observed[t.observed_count++] = entry;
-        if (marks[p] & rigid) t.inner[t.inner_count++] = entry;
-    }
+    t.exact = true;
     for (int g = 0; g < t.paths.groups; ++g) {
         const int p = t.first[g];
         const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
@@ -185,9 +179,10 @@ void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
         t.twist_slot[g] = edge.shaft < 0 ? 0 : m.masses + edge.shaft;
         t.twist_factor[g] = edge.shaft < 0 ? 0 : edge.sign / t.ratio[p];
         t.twist_back[g] = edge.sign * t.ratio[p];
+        t.exact = t.exact && std::fabs(t.ratio[p]) == 1;
     }
     const auto end = [&](int g, int position, double factor) {
-        if (!(marks[position] & rigid)) return;
+        if (!rigid[position]) return;
         t.end_group[t.end_count] = g;
         t.end_position[t.end_count] = position;
         t.end_factor[t.end_count++] = factor;
@@ -200,20 +195,30 @@ void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
     }
 }
 
+// Each link's group, with its factor times that of its position.
+GroupSlip on_groups(const ModelData& m, const TreeMode& t, const std::array<Link, 2>& links,
+                    const double* by_position) {
+    GroupSlip slip;
+    for (std::size_t i = 0; i < 2; ++i) {
+        if (links[i].mass < 0) continue;
+        const int p = m.tree->position[static_cast<std::size_t>(links[i].mass)];
+        slip.group[i] = t.group[p];
+        slip.factor[i] = by_position[p] * links[i].factor;
+    }
+    return slip;
+}
+
 void find_forces(const ModelData& m, const Mode& mode, TreeMode& t) {
     t.force_count = 0;
     for (int k = 0; k < m.forces; ++k) {
         if (k < m.pairs && mode.key[k]) continue;
-        int* group = t.force_group + 2 * t.force_count;
-        double* factor = t.force_factor + 2 * t.force_count;
-        for (std::size_t i = 0; i < 2; ++i) {
-            const Link& link = m.force_columns[static_cast<std::size_t>(k)][i];
-            const int p = link.mass < 0 ? 0 : m.tree->position[static_cast<std::size_t>(link.mass)];
-            group[i] = t.group[p];
-            factor[i] = link.mass < 0 ? 0 : t.force_ratio[p] * link.factor;
-        }
+        const auto i = static_cast<std::size_t>(k);
+        t.force_slip[t.force_count] = on_groups(m, t, m.force_on[i], t.ratio);
+        t.force_share[t.force_count] = on_groups(m, t, m.force_columns[i], t.force_ratio);
         t.force[t.force_count++] = k;
     }
+    for (int k = 0; k < m.meshes; ++k)
+        t.turning[k] = on_groups(m, t, m.mesh_loss[static_cast<std::size_t>(k)], t.ratio);
 }
 
 // Can anything in the mode swing or fade fast enough to matter? Nothing is faster than the bounds of Gershgorin's
@@ -249,7 +254,7 @@ void build_tree_mode(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     find_grounds(m, mode, t);
     weigh_groups(m, mode, t);
     find_paths(t);
-    find_masses(m, mode, t);
+    find_masses(m, t);
     find_forces(m, mode, t);
     if (t.ground_count > 0) factor_network(m, t);
     find_swing(m, t);

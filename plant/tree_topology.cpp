@@ -116,7 +116,7 @@ class Builder {
         }
         t->weight.resize(s.pairs.size() + 2 * s.meshes.size(),
                          1e3 * heaviest);  // sharing is for friction pairs
-        find_readers(*t);
+        for (const Mesh& mesh : s.meshes) t->lossy = t->lossy || mesh.lossy();
         t->kernel = choose_tree_kernel(model_.kernel.kind);
         return t;
     }
@@ -199,29 +199,6 @@ class Builder {
         edge.damping = c.damping;
         edge.sign = first ? 1 : -1;
         return edge;
-    }
-
-    void find_readers(TreeTopology& t) const {
-        t.read_by_laws.assign(near_.size(), 0);
-        const auto read = [&](int mass) {
-            t.read_by_laws[static_cast<std::size_t>(t.position[static_cast<std::size_t>(mass)])] = 1;
-        };
-        read(0);  // stands for the housing in ModelData's links, with the factor 0
-        for (std::size_t j = 0; j < near_.size(); ++j) {
-            if (model_.external_force[j] >= 0) read(static_cast<int>(j));
-        }
-        for (int mass : model_.translating) read(mass);
-        for (const Mesh& mesh : model_.structure.meshes) {
-            t.lossy = t.lossy || mesh.lossy();
-            read(mesh.first);  // its slip tells when it comes to rest
-            read(mesh.second);
-        }
-        for (const FrictionPair& pair : model_.structure.pairs) {
-            if (pair.kind == PairKind::clutch) continue;  // resistances read the speed of their mass
-            for (const Link& link : pair.links) {
-                if (link.mass >= 0) read(link.mass);
-            }
-        }
     }
 
     const ModelData& model_;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "plant/contact.h"
+#include "plant/few.h"
 #include "plant/forces.h"
 #include "plant/modes.h"
 #include "plant/tree.h"
@@ -53,7 +54,7 @@ void solve_network(const ModelData& m, const TreeMode& t, double* load, double* 
 }  // namespace
 
 int TreeWork::doubles(const ModelData& m) noexcept {
-    return (3 * 6 + 8 + 3 * 3) * stride(m) + 4 * m.auxiliary;
+    return 13 * stride(m) + 5 * m.forces + 4 * m.auxiliary;
 }
 
 TreeWork::TreeWork(const ModelData& m, double* memory) SHIFTRIG_REALTIME {
@@ -62,43 +63,76 @@ TreeWork::TreeWork(const ModelData& m, double* memory) SHIFTRIG_REALTIME {
         memory += length;
         return at;
     };
-    for (GroupState* state : {&begin, &end, &other}) {
-        for (double** vector :
-             {&state->speed, &state->twist, &state->rate, &state->passed, &state->torque, &state->force}) {
-            *vector = take();
-        }
-    }
-    for (double** vector :
-         {&momentum, &star_twist, &right, &stage_speed, &inverse, &lower, &load, &potential})
-        *vector = take();
-    for (int i = 0; i < 3; ++i) {
-        stage_torque[i] = take();
-        stage_force[i] = take();
-        stage_rate[i] = take();
-    }
-    for (double*& vector : auxiliary) {
-        vector = memory;
-        memory += m.auxiliary;
+    for (double** vector : {&momentum, &way, &inverse, &lower, &load, &potential}) *vector = take();
+    for (double*& vector : speed) vector = take();
+    for (double*& vector : swing) vector = take();
+    const auto take_row = [&](int length) {
+        double* const at = memory;
+        memory += length;
+        return at;
+    };
+    for (double*& vector : effort) vector = take_row(m.forces);
+    effort_sum = take_row(m.forces);
+    for (double*& vector : auxiliary) vector = take_row(m.auxiliary);
+}
+
+std::size_t group_state_size(const ModelData& m) {
+    return static_cast<std::size_t>(5 * stride(m));
+}
+
+void place_groups(const ModelData& m, GroupState& groups, double* memory) {
+    memory += margin;
+    for (double** vector : {&groups.speed, &groups.twist, &groups.rate, &groups.passed, &groups.net}) {
+        *vector = memory;
+        memory += stride(m);
     }
 }
 
-void read_groups(const ModelData& m, const TreeMode& t, const double* z, GroupState& s) SHIFTRIG_REALTIME {
-    for (int g = 0; g < t.paths.groups; ++g) s.speed[g] = t.speed_factor[g] * z[t.speed_slot[g]];
-    for (int g = 0; g < t.paths.groups; ++g) s.twist[g] = t.twist_factor[g] * z[t.twist_slot[g]];
-    m.tree->kernel.shaft_torques(t.paths, s.speed, s.twist, s.rate, s.passed, s.torque);
+void read_groups(const TreeMode& t, const double* z, GroupState& s) SHIFTRIG_REALTIME {
+    const int groups = t.paths.groups;
+    for (int g = 0; g < groups; ++g) s.speed[g] = t.speed_factor[g] * z[t.speed_slot[g]];
+    for (int g = 0; g < groups; ++g) s.twist[g] = t.twist_factor[g] * z[t.twist_slot[g]];
+    s.twist[groups] = 0;  // read, and of no consequence
 }
 
-void group_forces(const TreeMode& t, const double* f, double* force) SHIFTRIG_REALTIME {
-    std::fill(force, force + t.paths.groups, 0.);
+void add_efforts(const TreeMode& t, const double* effort, double* sum) SHIFTRIG_REALTIME {
     for (int i = 0; i < t.force_count; ++i) {
-        const double value = f[t.force[i]];
-        force[t.force_group[2 * i]] -= t.force_factor[2 * i] * value;
-        force[t.force_group[2 * i + 1]] -= t.force_factor[2 * i + 1] * value;
+        const GroupSlip& share = t.force_share[i];
+        sum[share.group[0]] -= share.factor[0] * effort[i];
+        sum[share.group[1]] -= share.factor[1] * effort[i];
     }
 }
 
-double rigid_torques(const Work& w, const Mode& mode, const GroupState& groups, Sample& s) SHIFTRIG_REALTIME {
+void complete_groups(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    const TreeMode& t = *mode.tree;
+    GroupState& groups = s.groups;
+    w.model.tree->kernel.shaft_torques(t.paths, groups.speed, groups.twist, groups.rate, groups.passed,
+                                       groups.net);
+    double* const effort = TreeWork(w.model, w.scratch.workspace.data()).effort_sum;
+    for (int i = 0; i < t.force_count; ++i) effort[i] = s.f[t.force[i]];
+    add_efforts(t, effort, groups.net);
+    groups.mode = &mode;
+    groups.modes_built = w.operators.misses;
+}
+
+const GroupState& groups_of(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    if (s.groups.mode != &mode || s.groups.modes_built != w.operators.misses) {
+        read_groups(*mode.tree, s.z, s.groups);
+        complete_groups(w, mode, s);
+    }
+    return s.groups;
+}
+
+void group_slips(const ModelData& m, const Mode& mode, const double* speed, Sample& s) SHIFTRIG_REALTIME {
+    const TreeMode& t = *mode.tree;
+    clear_few(s.slip, s.slip + m.forces);  // what is locked does not slip
+    for (int i = 0; i < t.force_count; ++i) s.slip[t.force[i]] = t.force_slip[i].of(speed);
+    for (int k = 0; k < m.meshes; ++k) s.turning[k] = mode.loss_share[k] == 0 ? 0 : t.turning[k].of(speed);
+}
+
+double rigid_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
+    const GroupState& groups = s.groups;
     const TreeTopology& topology = *m.tree;
     const TreeMode& t = *mode.tree;
     TreeWork work(m, w.scratch.workspace.data());
@@ -106,8 +140,7 @@ double rigid_torques(const Work& w, const Mode& mode, const GroupState& groups, 
     std::fill(s.torque, s.torque + m.torques, 0.);
     for (int i = 0; i < t.inner_count; ++i) {
         const TreeMass& mass = t.inner[i];
-        const double acceleration =
-            (groups.torque[mass.group] + groups.force[mass.group]) * t.inverse_mass[mass.group];
+        const double acceleration = groups.net[mass.group] * t.inverse_mass[mass.group];
         load[mass.position] = -mass.drag * groups.speed[mass.group] - mass.inertia * acceleration;
     }
     for (int i = 0; i < t.end_count; ++i)
@@ -147,43 +180,30 @@ double rigid_torques(const Work& w, const Mode& mode, const GroupState& groups, 
     return scale > 0 ? rest / scale : 0;
 }
 
+// Where somebody asks for them, z or f are other than they were.
 void tree_internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
-    const ModelData& m = w.model;
     ScratchData& scratch = w.scratch;
-    TreeWork work(m, scratch.workspace.data());
-    GroupState& groups = &s == &scratch.begin ? work.begin : work.other;
-    read_groups(m, *mode.tree, s.z, groups);
-    group_forces(*mode.tree, s.f, groups.force);
-    const double residual = rigid_torques(w, mode, groups, s);
-    if (&s == &scratch.begin) scratch.begin_groups = &mode;
+    read_groups(*mode.tree, s.z, s.groups);
+    complete_groups(w, mode, s);
+    const double residual = rigid_torques(w, mode, s);
     if (&s == &scratch.begin || &s == &scratch.end) scratch.torque_residual = residual;
 }
 
 void tree_slips(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
-    // Not of what is locked or loses nothing: speeds of masses that nobody asks for are not there at every instant.
-    for (int k = 0; k < m.forces; ++k) {
-        const bool held = k < m.pairs && mode.key[k];
-        s.slip[k] = held ? 0 : slip_fast(m.force_on[static_cast<std::size_t>(k)], s.z);
-    }
-    for (int k = 0; k < m.meshes; ++k) {
-        s.turning[k] = mode.loss_share[k] == 0 ? 0 : slip_fast(m.mesh_loss[static_cast<std::size_t>(k)], s.z);
-    }
+    s.groups.mode = nullptr;
+    read_groups(*mode.tree, s.z, s.groups);
+    group_slips(m, mode, s.groups.speed, s);
 }
 
 void tree_sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const TreeTopology& topology = *m.tree;
     const TreeMode& t = *mode.tree;
-    TreeWork work(m, w.scratch.workspace.data());
-    GroupState& groups = work.other;
-    read_groups(m, t, s.z, groups);
-    group_forces(t, s.f, groups.force);
-    for (int g = 0; g < t.paths.groups; ++g)
-        groups.torque[g] = (groups.torque[g] + groups.force[g]) * t.inverse_mass[g];
+    const GroupState& groups = groups_of(w, mode, s);
     for (int p = 0; p < m.masses; ++p) {
         const auto i = static_cast<std::size_t>(p);
-        const int mass = topology.mass[i];
-        s.rate[mass] = t.ratio[p] * groups.torque[t.group[p]];
+        const int mass = topology.mass[i], g = t.group[p];
+        s.rate[mass] = t.ratio[p] * (groups.net[g] * t.inverse_mass[g]);
         const TreeTopology::Edge& edge = topology.edges[i];
         if (edge.shaft < 0) continue;
         s.rate[m.masses + edge.shaft] =
@@ -192,11 +212,17 @@ void tree_sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALT
     std::fill(s.rate + m.states, s.rate + m.states_padded, 0.);
 }
 
+double tree_acceleration(const Work& w, const Mode& mode, Sample& s, int mass) SHIFTRIG_REALTIME {
+    const TreeMode& t = *mode.tree;
+    const int p = w.model.tree->position[static_cast<std::size_t>(mass)], g = t.group[p];
+    return t.ratio[p] * (groups_of(w, mode, s).net[g] * t.inverse_mass[g]);
+}
+
 void tree_mobility(const Work& w, const Mode& mode, const double* impulse, double* change) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const TreeTopology& topology = *m.tree;
     const TreeMode& t = *mode.tree;
-    double* sum = TreeWork(m, w.scratch.workspace.data()).right;
+    double* sum = TreeWork(m, w.scratch.workspace.data()).momentum;
     std::fill(sum, sum + t.paths.groups, 0.);
     for (int p = 0; p < m.masses; ++p) {
         sum[t.group[p]] += t.force_ratio[p] * impulse[topology.mass[static_cast<std::size_t>(p)]];
