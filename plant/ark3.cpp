@@ -210,16 +210,16 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     ScratchData& s = w.scratch;
     const TreeMode& t = *mode.tree;
     const TreeKernel& kernel = m.tree->kernel;
-    const TreeWork v(m, s.workspace.data());
+    TreeWork v(m, s.workspace);
     Sample &begin = s.begin, &late = s.late, &end = s.end;
     const double from = begin.at.fraction, length = end_fraction - from;
     const double h = length * w.h;
-    StageMatrix matrix{h * ark3_gamma, t.inverse, t.lower};
-    if (from != 0 || end_fraction != 1) {
-        factor_stage(t, matrix.weight, v.inverse, v.lower);
-        matrix.inverse = v.inverse;
-        matrix.lower = v.lower;
+    const bool whole = from == 0 && end_fraction == 1;
+    if (!whole) {
+        v.matrix.weight = h * ark3_gamma;
+        factor_stage(t, v.matrix);
     }
+    const StageMatrix& matrix = whole ? t.matrix : v.matrix;
 
     tabulate_contact(w, mode);
     const GroupState& start = groups_of(w, mode, begin);

@@ -140,15 +140,15 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
         build_tree_mode(m, *oldest);
         set_loss_shares(m, *oldest);
     } else {
-        build_mode(m, *oldest, scratch.workspace.data(), scratch.workspace_index.data());
+        build_mode(m, *oldest, scratch.workspace, scratch.workspace_index.data());
         std::fill(oldest->family_mobility, oldest->family_mobility + m.meshes, -1.);
         const double h = m.options.step_size;
-        oldest->step = build_step_operators(m, *oldest, h, oldest->step_memory, scratch.workspace.data());
+        oldest->step = build_step_operators(m, *oldest, h, oldest->step_memory, scratch.workspace);
         const int halvings = oldest->step.halvings;
         oldest->ledger_parts = halvings <= 1 ? 1 : 4 << std::min(halvings, 6);
         if (oldest->ledger_parts > 1) {
             oldest->ledger = build_step_operators(m, *oldest, h / oldest->ledger_parts, oldest->ledger_memory,
-                                                  scratch.workspace.data());
+                                                  scratch.workspace);
         }
     }
     list_row_links(m, *oldest);

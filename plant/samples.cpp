@@ -26,6 +26,7 @@ void place_sample(const ModelData& m, Sample& s, double* memory) {
     const auto pairs = static_cast<std::size_t>(m.pairs),
                padded_pairs = static_cast<std::size_t>(whole_panels(m.pairs)),
                auxiliary = static_cast<std::size_t>(m.auxiliary);
+    if (m.tree) place_groups(m, s.groups, take(group_state_size(m)));
     s.slip =
         take(static_cast<std::size_t>(whole_panels(m.seen)));  // what products write begins on cache lines
     s.motion = s.slip + m.forces;
@@ -47,7 +48,6 @@ void place_sample(const ModelData& m, Sample& s, double* memory) {
     s.converter = take(2 * m.converters.size());
     s.engine_torque = take(m.engines.size());
     s.engine_full_load = take(m.engines.size());
-    if (m.tree) place_groups(m, s.groups, memory);
 }
 
 ScratchData::ScratchData(const ModelData& m) {
@@ -75,7 +75,9 @@ ScratchData::ScratchData(const ModelData& m) {
     torque_copy.assign(static_cast<std::size_t>(m.torques), 0.);
     works = aligned_doubles(static_cast<std::size_t>(m.forces) + loop_slack);
     work = works.data()->value;
-    workspace.assign(static_cast<std::size_t>(m.tree ? TreeWork::doubles(m) : workspace_doubles(m)), 0.);
+    workspace_memory =
+        aligned_doubles(static_cast<std::size_t>(m.tree ? TreeWork::doubles(m) : workspace_doubles(m)));
+    workspace = workspace_memory.data()->value;
     standstill.assign(static_cast<std::size_t>(rest_workspace(m)), 0.);
     workspace_index.assign(static_cast<std::size_t>(workspace_integers(m)), 0);
     piece.assign(static_cast<std::size_t>(m.masses), 0);
@@ -95,10 +97,11 @@ Scratch& Scratch::operator=(Scratch&&) noexcept = default;
 void Scratch::fill_with_nan() noexcept {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     detail::ScratchData& s = *data_;
-    for (auto* numbers : {&s.torque_copy, &s.held, &s.workspace, &s.standstill}) {
+    for (auto* numbers : {&s.torque_copy, &s.held, &s.standstill}) {
         std::fill(numbers->begin(), numbers->end(), nan);
     }
-    for (auto* lines : {&s.buffer, &s.vectors, &s.works, &s.operator_memory, &s.ledger_memory}) {
+    for (auto* lines : {&s.buffer, &s.vectors, &s.works, &s.workspace_memory, &s.operator_memory,
+                        &s.ledger_memory}) {
         for (detail::CacheLine& line : *lines) std::fill(std::begin(line.value), std::end(line.value), nan);
     }
     for (detail::PairLoad& load : s.loads) {

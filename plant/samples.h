@@ -95,7 +95,8 @@ struct ScratchData {
     double* work = nullptr;  // per force in this step, what it takes out: of pairs, their heat [J]
     double dissipated = 0, input_work = 0;  // in this step [J]
     double stored_before = 0, stored = 0;   // at its beginning, at its end [J]
-    std::vector<double> workspace;          // of the mode builder
+    AlignedDoubles workspace_memory;
+    double* workspace = nullptr;            // of the mode builder, or TreeWork
     std::vector<double> standstill;         // of rearrange(), which builds modes on its way
     std::vector<int> workspace_index;
     std::vector<int> piece;                         // per mass

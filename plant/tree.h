@@ -98,8 +98,7 @@ struct TreeMode {
     double* damping = nullptr;          // d'
     double* loss = nullptr;             // power lost in the link's damper per δ²
     double* drag_loss = nullptr;        // power lost to the housing per q²
-    double* inverse = nullptr;          // 1/D and L of the stage matrix for the model's step size
-    double* lower = nullptr;
+    StageMatrix matrix;                 // for the model's step size
     bool swings = false;  // may have swings that a step of the model's size damps noticeably
     // q = factor · z[slot], ψ = factor · z[slot]; without a shaft the factor is 0. Back: z = q or ψ over the factor.
     int* speed_slot = nullptr;
@@ -154,8 +153,11 @@ void find_grounds(const ModelData& model, Mode& mode, TreeMode& tree) SHIFTRIG_R
 // S = Ĉ W Ĉᵀ of the grounded groups.
 void factor_network(const ModelData& model, TreeMode& tree) SHIFTRIG_REALTIME;
 
-// L D Lᵀ of M + hγ D' + (hγ)² K' for the weight hγ: 1/D and L by group.
-void factor_stage(const TreeMode& tree, double weight, double* inverse, double* lower) SHIFTRIG_REALTIME;
+// L D Lᵀ of M + hγ D' + (hγ)² K' for the weight hγ of the matrix, which has its memory.
+void factor_stage(const TreeMode& tree, StageMatrix& matrix) SHIFTRIG_REALTIME;
+// The parts of the matrix, each so many doubles further in memory.
+constexpr int matrix_parts = 10;
+void place_matrix(StageMatrix& matrix, double* memory, std::size_t stride) noexcept;
 
 // ---- motion of the groups -----------------------------------------------------------------------------
 
@@ -175,7 +177,8 @@ void place_groups(const ModelData& model, GroupState& groups, double* memory);
 
 // Working memory of a step on the tree, in ScratchData::workspace.
 struct TreeWork {
-    double *momentum, *way, *inverse, *lower, *load, *potential, *speed[3], *swing[4];
+    double *momentum, *way, *load, *potential, *speed[3], *swing[4];
+    StageMatrix matrix;              // of a part of a step
     double *effort[4], *effort_sum;  // by TreeMode::force: of the stages, and weighed together
     double* auxiliary[4];
     TreeWork(const ModelData& model, double* memory) SHIFTRIG_REALTIME;

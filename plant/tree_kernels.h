@@ -22,7 +22,7 @@ struct TreePaths {
     int run_count = 0;
     const int* run_begin = nullptr;
     const int* run_parent = nullptr;
-    bool long_runs = false;  // worth following; short ones run into each other by themselves
+    bool long_runs = false;  // worth a scan; short ones run into each other by themselves
     const double* mass = nullptr;
     const double* inverse_mass = nullptr;  // 0 where grounded
     bool drags = false;                    // some group is damped to the housing
@@ -53,9 +53,17 @@ struct Twists {
     double share = 1;
 };
 // One implicit stage: q of (M + hγ D + (hγ)² K) q = momentum − hγ K twists, with the weight hγ.
+//
+// Along a run x_g = y_g + L x of the one before is worked out for eight groups at a time: to y of each that of the one, then
+// two, then four before it in its block is added with these factors, at last what stands before the block. Blocks are
+// counted from where the sweep begins; what is left of a run goes one by one. Only where runs are long.
+struct TreeScan {
+    double *by_one = nullptr, *by_two = nullptr, *by_four = nullptr, *from_outside = nullptr;
+};
 struct StageMatrix {
     double weight = 0;
-    const double *inverse = nullptr, *lower = nullptr;  // 1/D, L
+    double *inverse = nullptr, *lower = nullptr;  // 1/D, L
+    TreeScan towards_leaves, towards_roots;
 };
 using Solve = void (*)(const TreePaths&, const StageMatrix&, const double* momentum, const Twists&,
                        double* speed) SHIFTRIG_REALTIME;

@@ -1,9 +1,31 @@
 // The loops of tree_kernels.h, included once per instruction set with SHIFTRIG_FMA(a, b, c) = a b + c. No function of the
 // standard library may be instantiated here: the linker would keep one copy for all instruction sets.
+#include <cstdint>
+
 #include "plant/tree_kernels.h"
 
 namespace shiftrig::plant::detail {
 namespace {
+
+// All of it is inlined here: no other file ever passes a block by value.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+using Block = double __attribute__((vector_size(64)));
+using Lanes = std::int64_t __attribute__((vector_size(64)));
+
+inline Block read(const double* p) noexcept {
+    Block v;
+    __builtin_memcpy(&v, p, sizeof v);
+    return v;
+}
+inline void write(double* p, const Block& v) noexcept {
+    __builtin_memcpy(p, &v, sizeof v);
+}
+inline Block fma(const Block& a, const Block& b, const Block& c) noexcept {
+    Block sum;
+    for (int i = 0; i < 8; ++i) sum[i] = SHIFTRIG_FMA(a[i], b[i], c[i]);
+    return sum;
+}
 
 // Along the tree's edges; 0 at roots.
 inline void differences(const TreePaths& t, const double* __restrict way, double* __restrict difference) noexcept {
@@ -77,108 +99,74 @@ void combine(const TreePaths& t, const StageSums& s, double* momentum, double* w
     if (s.count == 4) combine_speeds<4>(t, s, momentum, way);
 }
 
-// Leaves towards roots: b of the parent += L b. Two neighbouring paths run side by side, since each is a chain of
-// dependent operations: the later one must be done before the earlier one passes the group it hangs on.
-inline void eliminate(const TreePaths& t, const double* __restrict lower, double* __restrict right) noexcept {
+// x_i + L_i · (the one before) along a run is a chain of dependent operations. Eight at a time it is a scan in a register,
+// and only what one block hands on to the next is a chain: TreeScan says what of a block's values goes on to which.
+template <int by>
+inline Block moved_up(const Block& v) noexcept {  // to higher numbers; the lowest are of no consequence
+    constexpr Lanes from = {(8 - by) % 8,  (9 - by) % 8,  (10 - by) % 8, (11 - by) % 8,
+                            (12 - by) % 8, (13 - by) % 8, (14 - by) % 8, (15 - by) % 8};
+    return __builtin_shuffle(v, from);
+}
+template <int by>
+inline Block moved_down(const Block& v) noexcept {
+    return moved_up<8 - by>(v);
+}
+
+// Leaves towards roots: b of the parent += L b.
+inline void eliminate(const TreePaths& t, const StageMatrix& m, double* __restrict right) noexcept {
+    const double* __restrict lower = m.lower;
     if (!t.long_runs) {
-        for (int g = t.groups - 1; g > 0; --g) {
+        for (int g = t.groups - 1; g > 0; --g)
             right[t.up[g]] = SHIFTRIG_FMA(lower[g], right[g], right[t.up[g]]);
-        }
         return;
     }
-    int p = t.run_count - 1;
-    while (p >= 0) {
-        const int b_begin = t.run_begin[p], b_end = t.run_begin[p + 1];
-        int b = b_end - 1;
-        double rb = right[b];
-        if (p > 0) {
-            const int a_begin = t.run_begin[p - 1];
-            const int stop = t.run_parent[p] > a_begin ? t.run_parent[p] : a_begin;
-            int a = b_begin - 1;
-            double ra = right[a];
-            int common = b - b_begin < a - stop ? b - b_begin : a - stop;
-            for (; common >= 4; common -= 4, a -= 4, b -= 4) {
-                for (int i = 0; i < 4; ++i) {
-                    rb = SHIFTRIG_FMA(lower[b - i], rb, right[b - i - 1]);
-                    ra = SHIFTRIG_FMA(lower[a - i], ra, right[a - i - 1]);
-                    right[b - i - 1] = rb;
-                    right[a - i - 1] = ra;
-                }
-            }
-            for (; common > 0; --common) {
-                rb = SHIFTRIG_FMA(lower[b], rb, right[b - 1]);
-                ra = SHIFTRIG_FMA(lower[a], ra, right[a - 1]);
-                right[--b] = rb;
-                right[--a] = ra;
-            }
-            while (b > b_begin) {
-                rb = SHIFTRIG_FMA(lower[b], rb, right[b - 1]);
-                right[--b] = rb;
-            }
-            if (t.run_parent[p] >= 0)
-                right[t.run_parent[p]] = SHIFTRIG_FMA(lower[b], rb, right[t.run_parent[p]]);
-            ra = right[a];
-            while (a > a_begin) {
-                ra = SHIFTRIG_FMA(lower[a], ra, right[a - 1]);
-                right[--a] = ra;
-            }
-            if (t.run_parent[p - 1] >= 0)
-                right[t.run_parent[p - 1]] = SHIFTRIG_FMA(lower[a], ra, right[t.run_parent[p - 1]]);
-            p -= 2;
-        } else {
-            while (b > b_begin) {
-                rb = SHIFTRIG_FMA(lower[b], rb, right[b - 1]);
-                right[--b] = rb;
-            }
-            if (t.run_parent[p] >= 0)
-                right[t.run_parent[p]] = SHIFTRIG_FMA(lower[b], rb, right[t.run_parent[p]]);
-            p -= 1;
+    const TreeScan& scan = m.towards_roots;
+    for (int run = t.run_count - 1; run >= 0; --run) {
+        const int begin = t.run_begin[run];
+        int g = t.run_begin[run + 1];
+        double below = 0;  // of the group behind
+        for (; g - 8 >= begin; g -= 8) {
+            const int at = g - 8;
+            Block b = read(right + at);
+            b = fma(read(scan.by_one + at), moved_down<1>(b), b);
+            b = fma(read(scan.by_two + at), moved_down<2>(b), b);
+            b = fma(read(scan.by_four + at), moved_down<4>(b), b);
+            write(right + at, fma(read(scan.from_outside + at), Block{} + below, b));
+            below = SHIFTRIG_FMA(scan.from_outside[at], below, b[0]);
         }
+        for (; g > begin; --g) {
+            const double above = right[g - 1];
+            below = g == t.run_begin[run + 1] ? above : SHIFTRIG_FMA(lower[g], below, above);
+            right[g - 1] = below;
+        }
+        const int up = t.run_parent[run];
+        if (up >= 0) right[up] = SHIFTRIG_FMA(lower[begin], below, right[up]);
     }
 }
 
 // Roots towards leaves: q = b/D + L q of the parent.
-inline void substitute(const TreePaths& t, const double* __restrict inverse, const double* __restrict lower,
-                       double* __restrict speed) noexcept {
-    const auto next = [=](int g, double above) {
-        return speed[g] = SHIFTRIG_FMA(lower[g], above, inverse[g] * speed[g]);
-    };
+inline void substitute(const TreePaths& t, const StageMatrix& m, double* __restrict speed) noexcept {
+    const double* __restrict inverse = m.inverse, * __restrict lower = m.lower;
     if (!t.long_runs) {
         speed[0] *= inverse[0];
-        for (int g = 1; g < t.groups; ++g) next(g, speed[t.up[g]]);
+        for (int g = 1; g < t.groups; ++g)
+            speed[g] = SHIFTRIG_FMA(lower[g], speed[t.up[g]], inverse[g] * speed[g]);
         return;
     }
-    int p = 0;
-    const auto head = [&](int path) {
-        const int g = t.run_begin[path], up = t.run_parent[path];
-        return next(g, up >= 0 ? speed[up] : 0);
-    };
-    while (p < t.run_count) {
-        const int a_end = t.run_begin[p + 1];
-        double qa = head(p);
-        int a = t.run_begin[p] + 1;
-        if (p + 1 < t.run_count) {
-            const int up = t.run_parent[p + 1];
-            while (a <= up && a < a_end) qa = next(a++, qa);
-            const int b_end = t.run_begin[p + 2];
-            double qb = head(p + 1);
-            int b = a_end + 1;
-            int common = a_end - a < b_end - b ? a_end - a : b_end - b;
-            for (; common >= 4; common -= 4, a += 4, b += 4) {
-                for (int i = 0; i < 4; ++i) {
-                    qa = next(a + i, qa);
-                    qb = next(b + i, qb);
-                }
-            }
-            for (; common > 0; --common) {
-                qa = next(a++, qa);
-                qb = next(b++, qb);
-            }
-            while (b < b_end) qb = next(b++, qb);
-            ++p;
+    const TreeScan& scan = m.towards_leaves;
+    for (int run = 0; run < t.run_count; ++run) {
+        const int up = t.run_parent[run], end = t.run_begin[run + 1];
+        double above = up >= 0 ? speed[up] : 0;
+        int g = t.run_begin[run];
+        for (; g + 8 <= end; g += 8) {
+            Block q = read(inverse + g) * read(speed + g);
+            q = fma(read(scan.by_one + g), moved_up<1>(q), q);
+            q = fma(read(scan.by_two + g), moved_up<2>(q), q);
+            q = fma(read(scan.by_four + g), moved_up<4>(q), q);
+            write(speed + g, fma(read(scan.from_outside + g), Block{} + above, q));
+            above = SHIFTRIG_FMA(scan.from_outside[g + 7], above, q[7]);
         }
-        while (a < a_end) qa = next(a++, qa);
-        ++p;
+        for (; g < end; ++g) above = speed[g] = SHIFTRIG_FMA(lower[g], above, inverse[g] * speed[g]);
     }
 }
 
@@ -201,8 +189,8 @@ void solve(const TreePaths& t, const StageMatrix& stage, const double* momentum,
         right[g] += taken - passed;
         right[up] += passed;
     }
-    eliminate(t, stage.lower, right);
-    substitute(t, stage.inverse, stage.lower, right);
+    eliminate(t, stage, right);
+    substitute(t, stage, right);
 }
 
 void finish(const TreePaths& t, const Twists& twists, double weight, const double* last_speed, double* speed,
@@ -225,6 +213,22 @@ void finish(const TreePaths& t, const Twists& twists, double weight, const doubl
     end[groups] = 0;  // read, and of no consequence
 }
 
+// Σ weight (a² + 4 b² + c²)
+inline double sum_squares(const double* weight, const double* a, const double* b, const double* c,
+                          int count) noexcept {
+    Block sums = {};
+    int g = 0;
+    for (; g + 8 <= count; g += 8) {
+        const Block first = read(a + g), second = read(b + g), third = read(c + g);
+        sums = fma(read(weight + g), fma(4. * second, second, fma(first, first, third * third)), sums);
+    }
+    for (int i = 0; g < count; ++g, ++i) {
+        const double squares = SHIFTRIG_FMA(4 * b[g], b[g], SHIFTRIG_FMA(a[g], a[g], c[g] * c[g]));
+        sums[i] = SHIFTRIG_FMA(weight[g], squares, sums[i]);
+    }
+    return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+}
+
 double middle(const TreePaths& t, const MiddleSums& s, double* speed, double* rate) SHIFTRIG_REALTIME {
     double* __restrict q = speed;
     const double eighth = s.h / 8;
@@ -234,28 +238,12 @@ double middle(const TreePaths& t, const MiddleSums& s, double* speed, double* ra
     for (int g = 0; g < groups; ++g)
         q[g] = SHIFTRIG_FMA(eighth, (n0[g] - n1[g]) * inverse[g], 0.5 * (q0[g] + q1[g]));
     differences(t, speed, rate);
-    constexpr int lanes = 8;
-    double sums[lanes] = {};
-    const double *d0 = s.rate[0], *d1 = s.rate[1], *loss = s.loss, *drag_loss = s.drag_loss;
-    const auto squares = [](double a, double b, double c) {
-        return SHIFTRIG_FMA(4 * b, b, SHIFTRIG_FMA(a, a, c * c));
-    };
-    int g = 0;
-    for (; g + lanes <= groups; g += lanes) {
-        for (int i = 0; i < lanes; ++i)
-            sums[i] = SHIFTRIG_FMA(loss[g + i], squares(d0[g + i], rate[g + i], d1[g + i]), sums[i]);
-    }
-    for (int i = 0; g < groups; ++g, ++i) sums[i] = SHIFTRIG_FMA(loss[g], squares(d0[g], rate[g], d1[g]), sums[i]);
-    if (t.drags) {
-        for (g = 0; g < groups; ++g)
-            sums[g % lanes] = SHIFTRIG_FMA(drag_loss[g], squares(q0[g], q[g], q1[g]), sums[g % lanes]);
-    }
-    return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+    const double *d0 = s.rate[0], *d1 = s.rate[1];
+    const double loss = sum_squares(s.loss, d0, rate, d1, groups);
+    return t.drags ? loss + sum_squares(s.drag_loss, q0, q, q1, groups) : loss;
 }
 
 Swing swing_error(const TreePaths& t, const StageSums& s, double* way, double* twist) SHIFTRIG_REALTIME {
-    constexpr int lanes = 8;
-    double errors[lanes] = {}, speeds[lanes] = {};
     const double *__restrict q0 = s.speed[0], *__restrict q1 = s.speed[1], *__restrict q2 = s.speed[2],
                             *__restrict q3 = s.speed[3];
     const double w0 = s.of_way[0], w1 = s.of_way[1], w2 = s.of_way[2], w3 = s.of_way[3];
@@ -265,21 +253,21 @@ Swing swing_error(const TreePaths& t, const StageSums& s, double* way, double* t
         turned[g] = SHIFTRIG_FMA(w3, q3[g], SHIFTRIG_FMA(w2, q2[g], SHIFTRIG_FMA(w1, q1[g], w0 * q0[g])));
     differences(t, way, twist);
     twist[-1] = twist[groups] = 0;  // read, and of no consequence
-    const auto look = [=](int g, double& error, double& fastest) {
-        const double wrong = __builtin_fabs(twist[g]), q = __builtin_fabs(q3[g]);
-        error = wrong > error ? wrong : error;
-        fastest = q > fastest ? q : fastest;
-    };
+    const auto larger = [](const Block& a, const Block& b) { return a > b ? a : b; };
+    const auto magnitude = [](const Block& v) { return reinterpret_cast<Block>(reinterpret_cast<Lanes>(v) & INT64_MAX); };
+    Block errors = {}, speeds = {};
     int g = 0;
-    for (; g + lanes <= groups; g += lanes) {
-        for (int i = 0; i < lanes; ++i) look(g + i, errors[i], speeds[i]);
+    for (; g + 8 <= groups; g += 8) {
+        errors = larger(magnitude(read(twist + g)), errors);
+        speeds = larger(magnitude(read(q3 + g)), speeds);
     }
-    for (int i = 0; g < groups; ++g, ++i) look(g, errors[i], speeds[i]);
     Swing swing;
-    for (int i = 0; i < lanes; ++i) {
-        swing.error = errors[i] > swing.error ? errors[i] : swing.error;
-        swing.fastest = speeds[i] > swing.fastest ? speeds[i] : swing.fastest;
-    }
+    const auto look = [&](double error, double speed) {
+        swing.error = error > swing.error ? error : swing.error;
+        swing.fastest = speed > swing.fastest ? speed : swing.fastest;
+    };
+    for (int i = 0; i < 8; ++i) look(errors[i], speeds[i]);
+    for (; g < groups; ++g) look(__builtin_fabs(twist[g]), __builtin_fabs(q3[g]));
     return swing;
 }
 

@@ -9,11 +9,20 @@
 
 namespace shiftrig::plant::detail {
 
+namespace {
+
+// Of one array by group or position: whole panels, so that each begins on a cache line.
+std::size_t stride(const ModelData& m) {
+    return static_cast<std::size_t>(whole_panels(m.masses + 1));
+}
+
+}  // namespace
+
 TreeSizes::TreeSizes(const ModelData& m) {
-    const auto n = static_cast<std::size_t>(m.masses) + 1;
+    const std::size_t n = stride(m);
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
     const auto forces = static_cast<std::size_t>(m.forces);
-    doubles = 20 * n + grounds;
+    doubles = (18 + matrix_parts) * n + static_cast<std::size_t>(whole_panels(static_cast<int>(grounds)));
     integers = 16 * n + 2 * grounds + forces;
     bytes = (n + 7) / 8 * 8;
     masses = n;
@@ -22,17 +31,18 @@ TreeSizes::TreeSizes(const ModelData& m) {
 
 void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers, unsigned char* bytes,
                 TreeMass* masses, GroupSlip* slips) noexcept {
-    const auto n = static_cast<std::size_t>(m.masses) + 1;
+    const std::size_t n = stride(m);
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
     for (double** array :
          {&t.ratio, &t.force_ratio, &t.mass, &t.inverse_mass, &t.drag, &t.stiffness, &t.damping, &t.loss,
-          &t.drag_loss, &t.inverse, &t.lower, &t.edge_own, &t.edge_up, &t.network_inverse, &t.network_lower,
+          &t.drag_loss, &t.edge_own, &t.edge_up, &t.network_inverse, &t.network_lower,
           &t.speed_factor, &t.twist_factor, &t.twist_back}) {
         *array = doubles;
         doubles += n;
     }
     t.end_factor = doubles;  // two ends of every link
-    t.ground_factor = t.end_factor + 2 * n;
+    place_matrix(t.matrix, t.end_factor + 2 * n, n);
+    t.ground_factor = t.end_factor + (2 + matrix_parts) * n;
     for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.head,
                         &t.run_begin, &t.run_parent, &t.speed_slot, &t.twist_slot, &t.up}) {
         *array = integers;
@@ -225,7 +235,7 @@ void find_forces(const ModelData& m, const Mode& mode, TreeMode& t) {
 // circles of M⁻¹ K and M⁻¹ D.
 void find_swing(const ModelData& m, TreeMode& t) {
     double swing = 0, fade = 0;                         // ω², 1/s
-    double *stiffness = t.inverse, *damping = t.lower;  // Σ of the links at each group; not yet in use
+    double *stiffness = t.matrix.inverse, *damping = t.matrix.lower;  // Σ of the links at each group; not yet in use
     std::fill(stiffness, stiffness + t.paths.groups, 0.);
     std::copy(t.drag, t.drag + t.paths.groups, damping);
     for (int g = t.paths.groups - 1; g >= 0; --g) {
@@ -258,10 +268,58 @@ void build_tree_mode(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     find_forces(m, mode, t);
     if (t.ground_count > 0) factor_network(m, t);
     find_swing(m, t);
-    factor_stage(t, ark3_gamma * m.options.step_size, t.inverse, t.lower);
+    t.matrix.weight = ark3_gamma * m.options.step_size;
+    factor_stage(t, t.matrix);
 }
 
-void factor_stage(const TreeMode& t, double weight, double* inverse, double* lower) SHIFTRIG_REALTIME {
+void place_matrix(StageMatrix& matrix, double* memory, std::size_t stride) noexcept {
+    TreeScan &up = matrix.towards_roots, &down = matrix.towards_leaves;
+    for (double** part : {&matrix.inverse, &matrix.lower, &up.by_one, &up.by_two, &up.by_four, &up.from_outside,
+                          &down.by_one, &down.by_two, &down.by_four, &down.from_outside}) {
+        *part = memory;
+        memory += stride;
+    }
+}
+
+namespace {
+
+// Of a block of eight whose values each take `link` times the one before: the factors of a scan. `direction` is where
+// `before` lies: −1 towards roots' side, +1 towards leaves'; `first` is the one that the sweep meets first.
+void scan_block(const double (&link)[8], int first, int direction, TreeScan& scan) {
+    for (int i = 0; i < 8; ++i) {
+        const auto product = [&](int from, int count) {  // of the links of so many, from this one backwards
+            double factor = 1;
+            for (int j = from; j > from - count; --j) factor *= link[j];
+            return factor;
+        };
+        const int g = first + direction * i;
+        scan.by_one[g] = i < 1 ? 0 : product(i, 1);
+        scan.by_two[g] = i < 2 ? 0 : product(i, 2);
+        scan.by_four[g] = i < 4 ? 0 : product(i, 4);
+        scan.from_outside[g] = product(i, i + 1);
+    }
+}
+
+void prepare_scans(const TreePaths& t, StageMatrix& m) {
+    for (int run = 0; run < t.run_count; ++run) {
+        const int begin = t.run_begin[run], end = t.run_begin[run + 1];
+        double link[8];
+        for (int g = begin; g + 8 <= end; g += 8) {
+            for (int i = 0; i < 8; ++i) link[i] = m.lower[g + i];
+            scan_block(link, g, 1, m.towards_leaves);
+        }
+        for (int g = end; g - 8 >= begin; g -= 8) {
+            for (int i = 0; i < 8; ++i) link[i] = g - i == end ? 0 : m.lower[g - i];
+            scan_block(link, g - 1, -1, m.towards_roots);
+        }
+    }
+}
+
+}  // namespace
+
+void factor_stage(const TreeMode& t, StageMatrix& matrix) SHIFTRIG_REALTIME {
+    const double weight = matrix.weight;
+    double *const inverse = matrix.inverse, *const lower = matrix.lower;
     const int groups = t.paths.groups;
     for (int g = 0; g < groups; ++g) inverse[g] = t.mass[g] + weight * t.drag[g];
     for (int g = groups - 1; g >= 0; --g) {
@@ -279,6 +337,7 @@ void factor_stage(const TreeMode& t, double weight, double* inverse, double* low
         }
         inverse[g] = t.grounded[g] ? 0 : 1 / inverse[g];
     }
+    if (t.paths.long_runs) prepare_scans(t.paths, matrix);
 }
 
 }  // namespace shiftrig::plant::detail

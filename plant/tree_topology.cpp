@@ -94,7 +94,7 @@ class Builder {
         const std::size_t n = near_.size();
         t->position.assign(n, -1);
         for (std::size_t j = 0; j < n; ++j) {
-            if (t->position[j] < 0) place_component(*t, middle_of_component(static_cast<int>(j)));
+            if (t->position[j] < 0) place_component(*t, end_of_component(static_cast<int>(j)));
         }
         const Structure& s = model_.structure;
         t->ground_damping.assign(n, 0.);
@@ -122,8 +122,8 @@ class Builder {
     }
 
   private:
-    // Middle of the longest path through the component of `start`: both arms of a chain are then equally long.
-    int middle_of_component(int start) const {
+    // An end of the longest path through the component of `start`: a chain is then one run.
+    int end_of_component(int start) const {
         std::vector<int> from(near_.size());
         const auto farthest = [&](int source) {
             std::vector<int> queue{source};
@@ -138,10 +138,7 @@ class Builder {
             }
             return queue.back();
         };
-        const int end = farthest(farthest(start));
-        std::vector<int> path;
-        for (int j = end; j >= 0; j = from[static_cast<std::size_t>(j)]) path.push_back(j);
-        return path[path.size() / 2];
+        return farthest(farthest(start));
     }
 
     void place_component(TreeTopology& t, int root) {

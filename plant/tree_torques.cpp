@@ -11,10 +11,10 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-constexpr int margin = 8;  // the inner loops may read one element beyond either end
+constexpr int margin = 8;  // a cache line: the inner loops may read one element beyond either end
 
 int stride(const ModelData& m) {
-    return padded(m.masses) + 2 * margin;
+    return whole_panels(m.masses + 1) + 2 * margin;
 }
 
 // Equilibrium inside the grounded groups: adds to the torques what the load leaves, takes it off the load.
@@ -54,7 +54,7 @@ void solve_network(const ModelData& m, const TreeMode& t, double* load, double* 
 }  // namespace
 
 int TreeWork::doubles(const ModelData& m) noexcept {
-    return 13 * stride(m) + 5 * m.forces + 4 * m.auxiliary;
+    return (11 + matrix_parts) * stride(m) + 5 * m.forces + 4 * m.auxiliary;
 }
 
 TreeWork::TreeWork(const ModelData& m, double* memory) SHIFTRIG_REALTIME {
@@ -63,9 +63,11 @@ TreeWork::TreeWork(const ModelData& m, double* memory) SHIFTRIG_REALTIME {
         memory += length;
         return at;
     };
-    for (double** vector : {&momentum, &way, &inverse, &lower, &load, &potential}) *vector = take();
+    for (double** vector : {&momentum, &way, &load, &potential}) *vector = take();
     for (double*& vector : speed) vector = take();
     for (double*& vector : swing) vector = take();
+    place_matrix(matrix, memory, static_cast<std::size_t>(stride(m)));
+    memory += matrix_parts * stride(m);
     const auto take_row = [&](int length) {
         double* const at = memory;
         memory += length;
@@ -108,7 +110,7 @@ void complete_groups(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTI
     GroupState& groups = s.groups;
     w.model.tree->kernel.shaft_torques(t.paths, groups.speed, groups.twist, groups.rate, groups.passed,
                                        groups.net);
-    double* const effort = TreeWork(w.model, w.scratch.workspace.data()).effort_sum;
+    double* const effort = TreeWork(w.model, w.scratch.workspace).effort_sum;
     for (int i = 0; i < t.force_count; ++i) effort[i] = s.f[t.force[i]];
     add_efforts(t, effort, groups.net);
     groups.mode = &mode;
@@ -135,7 +137,7 @@ double rigid_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTI
     const GroupState& groups = s.groups;
     const TreeTopology& topology = *m.tree;
     const TreeMode& t = *mode.tree;
-    TreeWork work(m, w.scratch.workspace.data());
+    TreeWork work(m, w.scratch.workspace);
     double* load = work.load;  // on each mass that carries rigid devices: M̃ − J ω̇
     std::fill(s.torque, s.torque + m.torques, 0.);
     for (int i = 0; i < t.inner_count; ++i) {
@@ -222,7 +224,7 @@ void tree_mobility(const Work& w, const Mode& mode, const double* impulse, doubl
     const ModelData& m = w.model;
     const TreeTopology& topology = *m.tree;
     const TreeMode& t = *mode.tree;
-    double* sum = TreeWork(m, w.scratch.workspace.data()).momentum;
+    double* sum = TreeWork(m, w.scratch.workspace).momentum;
     std::fill(sum, sum + t.paths.groups, 0.);
     for (int p = 0; p < m.masses; ++p) {
         sum[t.group[p]] += t.force_ratio[p] * impulse[topology.mass[static_cast<std::size_t>(p)]];
