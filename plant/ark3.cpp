@@ -195,12 +195,9 @@ bool is_overloaded(const Work& w, const Sample& s) {
 }
 
 void write_state(const ModelData& m, const TreeMode& t, const GroupState& s, double* z) {
-    const TreeTopology& topology = *m.tree;
-    for (int p = 0; p < m.masses; ++p)
-        z[topology.mass[static_cast<std::size_t>(p)]] = t.ratio[p] * s.speed[t.group[p]];
-    for (int g = 0; g < t.paths.groups; ++g) {
-        if (t.twist_factor[g] != 0) z[t.twist_slot[g]] = t.twist_back[g] * s.twist[g];
-    }
+    for (int j = 0; j < m.masses; ++j) z[j] = t.mass_ratio[j] * s.speed[t.mass_group[j]];
+    double* const twist = z + m.masses;
+    for (int e = 0; e < m.twists; ++e) twist[e] = t.shaft_ratio[e] * s.twist[t.shaft_group[e]];
 }
 
 }  // namespace

@@ -60,6 +60,12 @@ struct ClutchValues {
     int count = 0;
 };
 
+// The same of so many shafts: torque and twist.
+struct ShaftValues {
+    const double *stiffness = nullptr, *damping = nullptr, *twist = nullptr, *rate = nullptr;
+    int count = 0;
+};
+
 struct DeviceLoops {
     // Has every speed at the end the sense it is to have?
     bool (*senses_hold)(const SpeedCheck& check) SHIFTRIG_REALTIME = nullptr;
@@ -80,6 +86,9 @@ struct DeviceLoops {
                                int count) SHIFTRIG_REALTIME = nullptr;
     // Σ weight · v², weight 0 behind the last
     double (*weighted_square)(const double* weight, const double* v, int count) SHIFTRIG_REALTIME = nullptr;
+    // Bit for bit?
+    bool (*same)(const double* a, const double* b, int count) SHIFTRIG_REALTIME = nullptr;
+    void (*copy)(const double* from, int count, double* to) SHIFTRIG_REALTIME = nullptr;
     // With the work of each pair and the rate 1/h. Leaves in `before` what the surfaces were; true if one has passed a
     // limit upwards.
     bool (*heat)(const HeatTerms& terms, const double* work, double rate, double oil, double* surface,
@@ -87,8 +96,10 @@ struct DeviceLoops {
     // From the speeds of all masses at begin and end of the step; position, time since the last tooth, reading are its state.
     void (*pick_up)(const PickupTerms& terms, const double* begin, const double* end, double h,
                     double* position, double* since_edge, double* reading) SHIFTRIG_REALTIME = nullptr;
-    // Torque, slip, capacity, state, friction power and heat, of all clutches one after the other; returns where it ends.
+    // Torque, slip, capacity, state, friction power and heat, of all clutches one after the other; torque, then twist of all
+    // shafts. Return where it ends.
     double* (*show_clutches)(const ClutchValues& values, double* next)SHIFTRIG_REALTIME = nullptr;
+    double* (*show_shafts)(const ShaftValues& values, double* next)SHIFTRIG_REALTIME = nullptr;
 };
 
 }  // namespace shiftrig::plant::detail

@@ -112,12 +112,16 @@ void subtract(const double* a, const double* b, int count, double* difference) S
 // Read from 8 − n on, marks for the first n.
 alignas(64) constexpr std::int64_t first_marks[16] = {-1, -1, -1, -1, -1, -1, -1, -1};
 
+inline Marks first_of(int count) noexcept {
+    Marks counted;
+    __builtin_memcpy(&counted, first_marks + 8 - (count < lanes ? count : lanes), sizeof counted);
+    return counted;
+}
+
 inline double square(const double* v, int count) noexcept {
     Lanes sums = {};
     for (; count > 0; count -= lanes, v += lanes) {
-        Marks counted;
-        __builtin_memcpy(&counted, first_marks + 8 - (count < lanes ? count : lanes), sizeof counted);
-        const Lanes value = where(counted, read(v));
+        const Lanes value = where(first_of(count), read(v));
         sums += value * value;
     }
     return sum(sums);
@@ -129,12 +133,32 @@ double share_of_squares(const double* rest, int rests, const double* v, int coun
 }
 
 double weighted_square(const double* weight, const double* v, int count) SHIFTRIG_REALTIME {
-    Lanes sums = {};
-    for (int i = 0; i < count; i += lanes) {
-        const Lanes factor = read(weight + i), value = read(v + i);
-        sums += where(factor != 0, factor * value * value);
+    Lanes sums[2] = {};
+    for (; count > 2 * lanes; count -= 2 * lanes, weight += 2 * lanes, v += 2 * lanes) {
+        for (int i = 0; i < 2; ++i) {
+            const Lanes value = read(v + i * lanes);
+            sums[i] += read(weight + i * lanes) * value * value;
+        }
     }
-    return sum(sums);
+    for (int i = 0; i < 2 && count > i * lanes; ++i) {
+        const Lanes value = where(first_of(count - i * lanes), read(v + i * lanes));
+        sums[i] += read(weight + i * lanes) * value * value;
+    }
+    return sum(sums[0] + sums[1]);
+}
+
+bool same(const double* a, const double* b, int count) SHIFTRIG_REALTIME {
+    Marks different = {};
+    for (; count >= lanes; count -= lanes, a += lanes, b += lanes)
+        different |= reinterpret_cast<Marks>(read(a)) ^ reinterpret_cast<Marks>(read(b));
+    if (count > 0)
+        different |= first_of(count) & (reinterpret_cast<Marks>(read(a)) ^ reinterpret_cast<Marks>(read(b)));
+    return !any(different);
+}
+
+void copy(const double* from, int count, double* to) SHIFTRIG_REALTIME {
+    for (; count >= lanes; count -= lanes, from += lanes, to += lanes) write(to, read(from));
+    for (int i = 0; i < count; ++i) to[i] = from[i];
 }
 
 bool heat(const HeatTerms& t, const double* work, double rate, double oil, double* surface, double* bulk,
@@ -199,5 +223,14 @@ double* show_clutches(const ClutchValues& c, double* next) SHIFTRIG_REALTIME {
     return heat + c.count;
 }
 
-constexpr DeviceLoops device_loops{senses_hold,      may_dip,         press, drag,    book,         subtract,
-                                   share_of_squares, weighted_square, heat,  pick_up, show_clutches};
+double* show_shafts(const ShaftValues& s, double* next) SHIFTRIG_REALTIME {
+    double* const twist = next + s.count;
+    for (int e = 0; e < s.count; e += lanes)
+        write(next + e, read(s.stiffness + e) * read(s.twist + e) + read(s.damping + e) * read(s.rate + e));
+    for (int e = 0; e < s.count; e += lanes) write(twist + e, read(s.twist + e));
+    return twist + s.count;
+}
+
+constexpr DeviceLoops device_loops{senses_hold,      may_dip,         press, drag, book, subtract,
+                                   share_of_squares, weighted_square, same,  copy, heat, pick_up,
+                                   show_clutches,    show_shafts};

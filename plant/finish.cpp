@@ -32,7 +32,7 @@ bool is_carried(const ModelData& m, const OperatorsData& o, const double* block)
     const StateLayout& at = m.layout;
     const Sample& s = o.samples[0];
     // The step ended with the table up to date.
-    return same_bits(s.z, block + at.speeds, m.states) &&
+    return m.kernel.loops.same(s.z, block + at.speeds, m.states) &&
            same_bits(s.auxiliary, block + at.auxiliary, m.auxiliary) &&
            same_bytes(o.table.contact.data(), block + at.contact, o.table.contact.size()) &&
            same_bits(o.carried_engines.data(), block + at.engines, 3 * static_cast<int>(m.engines.size()));
@@ -267,7 +267,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     tabulate_contact(w, mode);
     advance_sensors(w, s.begin.z);
     write_integer(block, read_integer(block) + 1);
-    copy_few(s.begin.z, m.states, block + layout.speeds);  // twists follow the speeds
+    m.kernel.loops.copy(s.begin.z, m.states, block + layout.speeds);  // twists follow the speeds
     copy_few(s.begin.auxiliary, m.auxiliary, block + layout.auxiliary);
     advance_engine_modes(w);
     advance_temperatures(w);

@@ -193,6 +193,7 @@ void build_sizes(ModelData& m) {
         for (const Elastic& elastic : *elastics)
             m.swing_damping.push_back(elastic.gap > 0 ? 0 : elastic.damping);
     }
+    for (const Elastic& shaft : s.shafts) m.shaft_stiffness.push_back(shaft.stiffness);
     if (m.description.oil) m.drag_speed_limit = m.description.oil->drag_speed_limit;
     for (const PairLaw& law : m.pair_laws) {
         m.static_factor.push_back(law.friction.static_factor);
@@ -203,8 +204,8 @@ void build_sizes(ModelData& m) {
         m.power_given.push_back(k >= m.first_external && k < m.first_flank_force ? 1 : 0);
     }
     m.swings = static_cast<int>(m.swing_damping.size());
-    for (auto* numbers : {&m.energy_factor, &m.static_factor, &m.sliding_at_rest, &m.swing_damping,
-                          &m.power_lost, &m.power_given})
+    for (auto* numbers : {&m.energy_factor, &m.static_factor, &m.sliding_at_rest, &m.shaft_stiffness,
+                          &m.swing_damping, &m.power_lost, &m.power_given})
         numbers->resize(numbers->size() + loop_slack, 0.);
 }
 

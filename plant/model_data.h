@@ -137,6 +137,7 @@ struct ModelData {
     // For the loops over all devices, so many zeros longer that whole registers can be read:
     std::vector<double> energy_factor;                   // by state: J/2, then k/2
     std::vector<double> static_factor, sliding_at_rest;  // per pair: of its load [1]
+    std::vector<double> shaft_stiffness;                 // per twist
     std::vector<double> swing_damping;                   // of shafts, then dampers
     // Per force: 1 where its power is lost in a pair or bearing, where it comes from outside.
     std::vector<double> power_lost, power_given;

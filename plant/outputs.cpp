@@ -22,7 +22,9 @@ void fill_outputs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     double* next = w.outputs.value.data();
     const auto put = [&next](auto... values) { ((*next++ = values), ...); };
 
-    next = copy_few(s.z, m.masses, next);
+    if (mode.tree) tree_swings(w, mode, s);
+    m.kernel.loops.copy(s.z, m.masses, next);
+    next += m.masses;
     const Shown at{w, mode, s};
     const auto show_all = [&](const auto& devices) {
         if (!devices.empty()) next = show(at, devices, next);

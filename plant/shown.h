@@ -24,9 +24,6 @@ struct Shown {
     double slip(int pair) const noexcept {  // [rad/s]
         return slip_fast(model().pair_slip[static_cast<std::size_t>(pair)], sample.z);
     }
-    double shaft_rate(int shaft) const noexcept {  // of its twist [rad/s]
-        return slip_fast(model().shaft_rate[static_cast<std::size_t>(shaft)], sample.z);
-    }
     // Which way power goes through a mesh that loses nothing.
     double flow(int mesh) const noexcept {
         const double motion = slip_fast(model().mesh_motion[static_cast<std::size_t>(mesh)], sample.z);

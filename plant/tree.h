@@ -100,12 +100,16 @@ struct TreeMode {
     double* drag_loss = nullptr;        // power lost to the housing per q²
     StageMatrix matrix;                 // for the model's step size
     bool swings = false;  // may have swings that a step of the model's size damps noticeably
-    // q = factor · z[slot], ψ = factor · z[slot]; without a shaft the factor is 0. Back: z = q or ψ over the factor.
+    // q = factor · z[slot], ψ = factor · z[slot]; without a shaft the factor is 0.
     int* speed_slot = nullptr;
     int* twist_slot = nullptr;
     double* speed_factor = nullptr;
     double* twist_factor = nullptr;
-    double* twist_back = nullptr;  // 1/twist_factor
+    // And back: of each mass its group and r, of each shaft its group and 1/factor.
+    int* mass_group = nullptr;
+    int* shaft_group = nullptr;
+    double* mass_ratio = nullptr;
+    double* shaft_ratio = nullptr;
     bool exact = false;            // all factors are ±1: there and back it is the same number
     // Forces that can be other than 0 (not those of locked pairs): what they slip at, and what they take from one or two
     // groups.
@@ -156,7 +160,7 @@ void factor_network(const ModelData& model, TreeMode& tree) SHIFTRIG_REALTIME;
 // L D Lᵀ of M + hγ D' + (hγ)² K' for the weight hγ of the matrix, which has its memory.
 void factor_stage(const TreeMode& tree, StageMatrix& matrix) SHIFTRIG_REALTIME;
 // The parts of the matrix, each so many doubles further in memory.
-constexpr int matrix_parts = 10;
+constexpr int matrix_parts = 8;
 void place_matrix(StageMatrix& matrix, double* memory, std::size_t stride) noexcept;
 
 // ---- motion of the groups -----------------------------------------------------------------------------
@@ -205,6 +209,8 @@ double rigid_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRI
 void tree_internal_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 // Slips of forces and meshes from z.
 void tree_slips(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+// Twist rates of the shafts.
+void tree_swings(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 void tree_sample_rate(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 double tree_acceleration(const Work& work, const Mode& mode, Sample& sample, int mass) SHIFTRIG_REALTIME;
 // ω̇ of impulses: change = B impulse.

@@ -1,4 +1,5 @@
 #define SHIFTRIG_FMA(a, b, c) ((a) * (b) + (c))
+#define SHIFTRIG_BLOCK_FMA(a, b, c) ((a) * (b) + (c))
 #include "plant/tree_kernels_body.h"
 
 namespace shiftrig::plant::detail {

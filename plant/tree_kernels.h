@@ -54,11 +54,12 @@ struct Twists {
 };
 // One implicit stage: q of (M + hγ D + (hγ)² K) q = momentum − hγ K twists, with the weight hγ.
 //
-// Along a run x_g = y_g + L x of the one before is worked out for eight groups at a time: to y of each that of the one, then
-// two, then four before it in its block is added with these factors, at last what stands before the block. Blocks are
-// counted from where the sweep begins; what is left of a run goes one by one. Only where runs are long.
+// Along a run x_g = y_g + L x of the one before is worked out for a block of groups at a time: to y of each that of the one,
+// then of the second before it in its block is added with these factors, at last what stands before the block. Blocks
+// are counted from where the sweep begins; what is left of a run goes one by one. Only where runs are long.
+constexpr int tree_block = 4;
 struct TreeScan {
-    double *by_one = nullptr, *by_two = nullptr, *by_four = nullptr, *from_outside = nullptr;
+    double *by_one = nullptr, *by_two = nullptr, *from_outside = nullptr;
 };
 struct StageMatrix {
     double weight = 0;

@@ -1,4 +1,5 @@
-// The loops of tree_kernels.h, included once per instruction set with SHIFTRIG_FMA(a, b, c) = a b + c. No function of the
+// The loops of tree_kernels.h, included once per instruction set with SHIFTRIG_FMA(a, b, c) = a b + c of numbers and
+// SHIFTRIG_BLOCK_FMA the same of four of them. No function of the
 // standard library may be instantiated here: the linker would keep one copy for all instruction sets.
 #include <cstdint>
 
@@ -10,8 +11,9 @@ namespace {
 // All of it is inlined here: no other file ever passes a block by value.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
-using Block = double __attribute__((vector_size(64)));
-using Lanes = std::int64_t __attribute__((vector_size(64)));
+using Block = double __attribute__((vector_size(32)));
+using Lanes = std::int64_t __attribute__((vector_size(32)));
+constexpr int lanes = tree_block;
 
 inline Block read(const double* p) noexcept {
     Block v;
@@ -20,11 +22,6 @@ inline Block read(const double* p) noexcept {
 }
 inline void write(double* p, const Block& v) noexcept {
     __builtin_memcpy(p, &v, sizeof v);
-}
-inline Block fma(const Block& a, const Block& b, const Block& c) noexcept {
-    Block sum;
-    for (int i = 0; i < 8; ++i) sum[i] = SHIFTRIG_FMA(a[i], b[i], c[i]);
-    return sum;
 }
 
 // Along the tree's edges; 0 at roots.
@@ -99,17 +96,17 @@ void combine(const TreePaths& t, const StageSums& s, double* momentum, double* w
     if (s.count == 4) combine_speeds<4>(t, s, momentum, way);
 }
 
-// x_i + L_i · (the one before) along a run is a chain of dependent operations. Eight at a time it is a scan in a register,
+// x_i + L_i · (the one before) along a run is a chain of dependent operations. A block at a time it is a scan in a register,
 // and only what one block hands on to the next is a chain: TreeScan says what of a block's values goes on to which.
-template <int by>
-inline Block moved_up(const Block& v) noexcept {  // to higher numbers; the lowest are of no consequence
-    constexpr Lanes from = {(8 - by) % 8,  (9 - by) % 8,  (10 - by) % 8, (11 - by) % 8,
-                            (12 - by) % 8, (13 - by) % 8, (14 - by) % 8, (15 - by) % 8};
-    return __builtin_shuffle(v, from);
+// Shifted by one and by two; those at the end come round, and their factors are 0.
+inline Block from_below(const Block& v) noexcept {
+    return __builtin_shuffle(v, Lanes{3, 0, 1, 2});
 }
-template <int by>
-inline Block moved_down(const Block& v) noexcept {
-    return moved_up<8 - by>(v);
+inline Block from_above(const Block& v) noexcept {
+    return __builtin_shuffle(v, Lanes{1, 2, 3, 0});
+}
+inline Block by_two(const Block& v) noexcept {
+    return __builtin_shuffle(v, Lanes{2, 3, 0, 1});
 }
 
 // Leaves towards roots: b of the parent += L b.
@@ -125,14 +122,14 @@ inline void eliminate(const TreePaths& t, const StageMatrix& m, double* __restri
         const int begin = t.run_begin[run];
         int g = t.run_begin[run + 1];
         double below = 0;  // of the group behind
-        for (; g - 8 >= begin; g -= 8) {
-            const int at = g - 8;
+        for (; g - lanes >= begin; g -= lanes) {
+            const int at = g - lanes;
             Block b = read(right + at);
-            b = fma(read(scan.by_one + at), moved_down<1>(b), b);
-            b = fma(read(scan.by_two + at), moved_down<2>(b), b);
-            b = fma(read(scan.by_four + at), moved_down<4>(b), b);
-            write(right + at, fma(read(scan.from_outside + at), Block{} + below, b));
-            below = SHIFTRIG_FMA(scan.from_outside[at], below, b[0]);
+            b = SHIFTRIG_BLOCK_FMA(read(scan.by_one + at), from_above(b), b);
+            b = SHIFTRIG_BLOCK_FMA(read(scan.by_two + at), by_two(b), b);
+            const Block outside = read(scan.from_outside + at);
+            write(right + at, SHIFTRIG_BLOCK_FMA(outside, Block{} + below, b));
+            below = SHIFTRIG_FMA(outside[0], below, b[0]);
         }
         for (; g > begin; --g) {
             const double above = right[g - 1];
@@ -158,13 +155,13 @@ inline void substitute(const TreePaths& t, const StageMatrix& m, double* __restr
         const int up = t.run_parent[run], end = t.run_begin[run + 1];
         double above = up >= 0 ? speed[up] : 0;
         int g = t.run_begin[run];
-        for (; g + 8 <= end; g += 8) {
+        for (; g + lanes <= end; g += lanes) {
             Block q = read(inverse + g) * read(speed + g);
-            q = fma(read(scan.by_one + g), moved_up<1>(q), q);
-            q = fma(read(scan.by_two + g), moved_up<2>(q), q);
-            q = fma(read(scan.by_four + g), moved_up<4>(q), q);
-            write(speed + g, fma(read(scan.from_outside + g), Block{} + above, q));
-            above = SHIFTRIG_FMA(scan.from_outside[g + 7], above, q[7]);
+            q = SHIFTRIG_BLOCK_FMA(read(scan.by_one + g), from_below(q), q);
+            q = SHIFTRIG_BLOCK_FMA(read(scan.by_two + g), by_two(q), q);
+            const Block outside = read(scan.from_outside + g);
+            write(speed + g, SHIFTRIG_BLOCK_FMA(outside, Block{} + above, q));
+            above = SHIFTRIG_FMA(outside[lanes - 1], above, q[lanes - 1]);
         }
         for (; g < end; ++g) above = speed[g] = SHIFTRIG_FMA(lower[g], above, inverse[g] * speed[g]);
     }
@@ -216,17 +213,23 @@ void finish(const TreePaths& t, const Twists& twists, double weight, const doubl
 // Σ weight (a² + 4 b² + c²)
 inline double sum_squares(const double* weight, const double* a, const double* b, const double* c,
                           int count) noexcept {
-    Block sums = {};
-    int g = 0;
-    for (; g + 8 <= count; g += 8) {
+    const auto squares = [=](int g) {
         const Block first = read(a + g), second = read(b + g), third = read(c + g);
-        sums = fma(read(weight + g), fma(4. * second, second, fma(first, first, third * third)), sums);
+        return SHIFTRIG_BLOCK_FMA(4. * second, second, SHIFTRIG_BLOCK_FMA(first, first, third * third));
+    };
+    Block sums = {}, others = {};
+    int g = 0;
+    for (; g + 2 * lanes <= count; g += 2 * lanes) {
+        sums = SHIFTRIG_BLOCK_FMA(read(weight + g), squares(g), sums);
+        others = SHIFTRIG_BLOCK_FMA(read(weight + g + lanes), squares(g + lanes), others);
     }
-    for (int i = 0; g < count; ++g, ++i) {
-        const double squares = SHIFTRIG_FMA(4 * b[g], b[g], SHIFTRIG_FMA(a[g], a[g], c[g] * c[g]));
-        sums[i] = SHIFTRIG_FMA(weight[g], squares, sums[i]);
+    sums += others;
+    double sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+    for (; g < count; ++g) {
+        const double square = SHIFTRIG_FMA(4 * b[g], b[g], SHIFTRIG_FMA(a[g], a[g], c[g] * c[g]));
+        sum = SHIFTRIG_FMA(weight[g], square, sum);
     }
-    return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+    return sum;
 }
 
 double middle(const TreePaths& t, const MiddleSums& s, double* speed, double* rate) SHIFTRIG_REALTIME {
@@ -257,7 +260,7 @@ Swing swing_error(const TreePaths& t, const StageSums& s, double* way, double* t
     const auto magnitude = [](const Block& v) { return reinterpret_cast<Block>(reinterpret_cast<Lanes>(v) & INT64_MAX); };
     Block errors = {}, speeds = {};
     int g = 0;
-    for (; g + 8 <= groups; g += 8) {
+    for (; g + lanes <= groups; g += lanes) {
         errors = larger(magnitude(read(twist + g)), errors);
         speeds = larger(magnitude(read(q3 + g)), speeds);
     }
@@ -266,7 +269,7 @@ Swing swing_error(const TreePaths& t, const StageSums& s, double* way, double* t
         swing.error = error > swing.error ? error : swing.error;
         swing.fastest = speed > swing.fastest ? speed : swing.fastest;
     };
-    for (int i = 0; i < 8; ++i) look(errors[i], speeds[i]);
+    for (int i = 0; i < lanes; ++i) look(errors[i], speeds[i]);
     for (; g < groups; ++g) look(__builtin_fabs(twist[g]), __builtin_fabs(q3[g]));
     return swing;
 }

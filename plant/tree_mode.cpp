@@ -22,8 +22,8 @@ TreeSizes::TreeSizes(const ModelData& m) {
     const std::size_t n = stride(m);
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
     const auto forces = static_cast<std::size_t>(m.forces);
-    doubles = (18 + matrix_parts) * n + static_cast<std::size_t>(whole_panels(static_cast<int>(grounds)));
-    integers = 16 * n + 2 * grounds + forces;
+    doubles = (19 + matrix_parts) * n + static_cast<std::size_t>(whole_panels(static_cast<int>(grounds)));
+    integers = 18 * n + 2 * grounds + forces;
     bytes = (n + 7) / 8 * 8;
     masses = n;
     slips = 2 * forces + static_cast<std::size_t>(m.meshes);
@@ -36,7 +36,7 @@ void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers,
     for (double** array :
          {&t.ratio, &t.force_ratio, &t.mass, &t.inverse_mass, &t.drag, &t.stiffness, &t.damping, &t.loss,
           &t.drag_loss, &t.edge_own, &t.edge_up, &t.network_inverse, &t.network_lower,
-          &t.speed_factor, &t.twist_factor, &t.twist_back}) {
+          &t.speed_factor, &t.twist_factor, &t.mass_ratio, &t.shaft_ratio}) {
         *array = doubles;
         doubles += n;
     }
@@ -44,7 +44,8 @@ void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers,
     place_matrix(t.matrix, t.end_factor + 2 * n, n);
     t.ground_factor = t.end_factor + (2 + matrix_parts) * n;
     for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.head,
-                        &t.run_begin, &t.run_parent, &t.speed_slot, &t.twist_slot, &t.up}) {
+                        &t.run_begin, &t.run_parent, &t.speed_slot, &t.twist_slot, &t.mass_group,
+                        &t.shaft_group, &t.up}) {
         *array = integers;
         integers += n;
     }
@@ -173,6 +174,8 @@ void find_masses(const ModelData& m, TreeMode& t) {
     t.inner_count = t.end_count = 0;
     for (int p = 0; p < m.masses; ++p) {
         const auto i = static_cast<std::size_t>(p);
+        t.mass_group[topology.mass[i]] = t.group[p];
+        t.mass_ratio[topology.mass[i]] = t.ratio[p];
         if (rigid[p]) {
             t.inner[t.inner_count++] = {
                 p, t.group[p],
@@ -188,7 +191,10 @@ void find_masses(const ModelData& m, TreeMode& t) {
         t.speed_factor[g] = t.grounded[g] ? 0 : 1 / t.ratio[p];
         t.twist_slot[g] = edge.shaft < 0 ? 0 : m.masses + edge.shaft;
         t.twist_factor[g] = edge.shaft < 0 ? 0 : edge.sign / t.ratio[p];
-        t.twist_back[g] = edge.sign * t.ratio[p];
+        if (edge.shaft >= 0) {
+            t.shaft_group[edge.shaft] = g;
+            t.shaft_ratio[edge.shaft] = edge.sign * t.ratio[p];
+        }
         t.exact = t.exact && std::fabs(t.ratio[p]) == 1;
     }
     const auto end = [&](int g, int position, double factor) {
@@ -274,8 +280,8 @@ void build_tree_mode(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
 
 void place_matrix(StageMatrix& matrix, double* memory, std::size_t stride) noexcept {
     TreeScan &up = matrix.towards_roots, &down = matrix.towards_leaves;
-    for (double** part : {&matrix.inverse, &matrix.lower, &up.by_one, &up.by_two, &up.by_four, &up.from_outside,
-                          &down.by_one, &down.by_two, &down.by_four, &down.from_outside}) {
+    for (double** part : {&matrix.inverse, &matrix.lower, &up.by_one, &up.by_two, &up.from_outside,
+                          &down.by_one, &down.by_two, &down.from_outside}) {
         *part = memory;
         memory += stride;
     }
@@ -283,33 +289,29 @@ void place_matrix(StageMatrix& matrix, double* memory, std::size_t stride) noexc
 
 namespace {
 
-// Of a block of eight whose values each take `link` times the one before: the factors of a scan. `direction` is where
-// `before` lies: −1 towards roots' side, +1 towards leaves'; `first` is the one that the sweep meets first.
-void scan_block(const double (&link)[8], int first, int direction, TreeScan& scan) {
-    for (int i = 0; i < 8; ++i) {
-        const auto product = [&](int from, int count) {  // of the links of so many, from this one backwards
-            double factor = 1;
-            for (int j = from; j > from - count; --j) factor *= link[j];
-            return factor;
-        };
+// Of a block whose values each take `link` times the one before: the factors of a scan. `first` is the value that the sweep
+// meets first, the others follow in this direction.
+void scan_block(const double (&link)[tree_block], int first, int direction, TreeScan& scan) {
+    double outside = 1;
+    for (int i = 0; i < tree_block; ++i) {
         const int g = first + direction * i;
-        scan.by_one[g] = i < 1 ? 0 : product(i, 1);
-        scan.by_two[g] = i < 2 ? 0 : product(i, 2);
-        scan.by_four[g] = i < 4 ? 0 : product(i, 4);
-        scan.from_outside[g] = product(i, i + 1);
+        outside *= link[i];
+        scan.by_one[g] = i < 1 ? 0 : link[i];
+        scan.by_two[g] = i < 2 ? 0 : link[i] * link[i - 1];
+        scan.from_outside[g] = outside;
     }
 }
 
 void prepare_scans(const TreePaths& t, StageMatrix& m) {
     for (int run = 0; run < t.run_count; ++run) {
         const int begin = t.run_begin[run], end = t.run_begin[run + 1];
-        double link[8];
-        for (int g = begin; g + 8 <= end; g += 8) {
-            for (int i = 0; i < 8; ++i) link[i] = m.lower[g + i];
+        double link[tree_block];
+        for (int g = begin; g + tree_block <= end; g += tree_block) {
+            for (int i = 0; i < tree_block; ++i) link[i] = m.lower[g + i];
             scan_block(link, g, 1, m.towards_leaves);
         }
-        for (int g = end; g - 8 >= begin; g -= 8) {
-            for (int i = 0; i < 8; ++i) link[i] = g - i == end ? 0 : m.lower[g - i];
+        for (int g = end; g - tree_block >= begin; g -= tree_block) {
+            for (int i = 0; i < tree_block; ++i) link[i] = g - i == end ? 0 : m.lower[g - i];
             scan_block(link, g - 1, -1, m.towards_roots);
         }
     }

@@ -197,6 +197,13 @@ void tree_slips(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTI
     group_slips(m, mode, s.groups.speed, s);
 }
 
+void tree_swings(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    const TreeMode& t = *mode.tree;
+    const double* const rate = groups_of(w, mode, s).rate;
+    for (int e = 0, count = w.model.twists; e < count; ++e)
+        s.swing[e] = t.shaft_ratio[e] * rate[t.shaft_group[e]];
+}
+
 void tree_sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const TreeTopology& topology = *m.tree;

@@ -34,7 +34,7 @@ double* show(const detail::Shown& at, const std::vector<Backlash>&, double* next
     for (const BacklashLaw& law : m.backlashes) {
         const double side = detail::flank_side(at.work.contact[law.device]);
         const double twist = at.sample.z[m.masses + law.shaft];
-        *next++ = side == 0 ? 0. : flank_torque(law, side, twist, at.shaft_rate(law.shaft));
+        *next++ = side == 0 ? 0. : flank_torque(law, side, twist, at.sample.swing[law.shaft]);
         *next++ = twist;
         *next++ = side;
     }

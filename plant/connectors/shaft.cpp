@@ -18,23 +18,22 @@ void assemble(Assembly& assembly, const Shaft& s) {
         {s.name, assembly.between(s.a, s.b), s.stiffness, s.damping, 0, s.initial_twist});
 }
 
+// One quantity of all shafts after the other: loops write them so.
 void name_outputs(detail::ModelBuilder& builder, const std::vector<Shaft>& shafts) {
+    for (const Shaft& shaft : shafts)
+        builder.output("shaft." + shaft.name + ".torque", Unit::newton_metre, "torque on the first link");
     for (const Shaft& shaft : shafts) {
-        const std::string prefix = "shaft." + shaft.name + ".";
-        builder.output(prefix + "torque", Unit::newton_metre, "torque on the first link");
-        builder.output(prefix + "twist", Unit::radian, "twist, positive where the first link is ahead");
+        builder.output("shaft." + shaft.name + ".twist", Unit::radian,
+                       "twist, positive where the first link is ahead");
     }
 }
 
 double* show(const detail::Shown& at, const std::vector<Shaft>& shafts, double* next) SHIFTRIG_REALTIME {
     const detail::ModelData& m = at.model();
-    const double* twist = at.sample.z + m.masses;
-    for (std::size_t e = 0; e < shafts.size(); ++e, ++twist) {  // plain shafts are the first
-        const double rate = at.mode.tree ? at.shaft_rate(static_cast<int>(e)) : at.sample.swing[e];
-        *next++ = m.structure.shafts[e].stiffness * *twist + m.swing_damping[e] * rate;
-        *next++ = *twist;
-    }
-    return next;
+    return m.kernel.loops.show_shafts(
+        {m.shaft_stiffness.data(), m.swing_damping.data(), at.sample.z + m.masses, at.sample.swing,
+         static_cast<int>(shafts.size())},
+        next);  // plain shafts are the first
 }
 
 }  // namespace shiftrig::plant
