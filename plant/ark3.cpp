@@ -207,7 +207,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     ScratchData& s = w.scratch;
     const TreeMode& t = *mode.tree;
     const TreeKernel& kernel = m.tree->kernel;
-    TreeWork v(m, s.workspace);
+    TreeWork& v = s.tree;
     Sample &begin = s.begin, &late = s.late, &end = s.end;
     const double from = begin.at.fraction, length = end_fraction - from;
     const double h = length * w.h;

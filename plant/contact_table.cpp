@@ -52,11 +52,13 @@ void tabulate_contact(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     table.viscosity = w.operators.oil.viscosity;
     std::copy(w.contact, w.contact + m.contact_bytes, table.contact.begin());
     table.pressed_count = 0;
+    table.drags = false;
     for (int k = 0; k < m.pairs; ++k) {
         const unsigned char state = w.contact[k];
         const auto i = static_cast<std::size_t>(k);
         table.sense[k] = slip_sign(state);
         table.drag[k] = state == free_running ? m.pair_laws[i].drag * table.viscosity : 0;
+        table.drags = table.drags || table.drag[k] != 0;
         table.state_code[k] = state_codes[state];
         if (state != locked && table.laden[i] != 0)
             table.pressed[static_cast<std::size_t>(table.pressed_count++)] = k;

@@ -23,6 +23,7 @@ struct ContactTable {
     // keeps, 0 for all others.
     double* sense = nullptr;
     double* drag = nullptr;        // per pair: torque per slip of an open clutch in its oil [Nm s/rad]
+    bool drags = false;            // some of these are not 0
     double* state_code = nullptr;  // per pair, as outputs show it
     // Per mesh: power flows as assumed where drive · M_1 − drive_offset is not negative; 0 for those without losses or at rest.
     double* drive = nullptr;

@@ -129,8 +129,9 @@ void load_pairs(const Work& w, Sample& s) noexcept {
 // What open clutches drag; all other forces 0 for now.
 void open_drags(const Work& w, Sample& s) noexcept {
     const ModelData& m = w.model;
-    m.kernel.loops.drag(w.operators.table.drag, m.drag_speed_limit, s.slip, m.pairs, s.f);
-    clear_few(s.f + m.pairs, s.f + m.forces);
+    const ContactTable& table = w.operators.table;
+    if (table.drags) m.kernel.loops.drag(table.drag, m.drag_speed_limit, s.slip, m.pairs, s.f);
+    clear_few(table.drags ? s.f + m.pairs : s.f, s.f + m.forces);
 }
 
 // Torques that no contact state concerns, rates of the auxiliary states, and what the laws press together, added to

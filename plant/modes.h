@@ -125,6 +125,8 @@ struct OperatorsData {
     std::vector<TreeMode> trees;  // one per mode where the model has a tree
     std::vector<TreeMass> tree_masses;
     std::vector<GroupSlip> group_slips;
+    std::vector<TreeForce> tree_forces;
+    std::vector<TreeEdge> tree_edges;
     std::uint64_t clock = 0;
     const Mode* in_force = nullptr;             // not forgotten while other contact states are tried
     Mode* recent = nullptr;                     // the last one found,

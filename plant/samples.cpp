@@ -76,8 +76,9 @@ ScratchData::ScratchData(const ModelData& m) {
     works = aligned_doubles(static_cast<std::size_t>(m.forces) + loop_slack);
     work = works.data()->value;
     workspace_memory =
-        aligned_doubles(static_cast<std::size_t>(m.tree ? TreeWork::doubles(m) : workspace_doubles(m)));
+        aligned_doubles(static_cast<std::size_t>(m.tree ? tree_work_size(m) : workspace_doubles(m)));
     workspace = workspace_memory.data()->value;
+    if (m.tree) place_tree_work(m, tree, workspace);
     standstill.assign(static_cast<std::size_t>(rest_workspace(m)), 0.);
     workspace_index.assign(static_cast<std::size_t>(workspace_integers(m)), 0);
     piece.assign(static_cast<std::size_t>(m.masses), 0);

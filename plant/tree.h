@@ -66,6 +66,19 @@ struct TreeMass {
     double drag = 0;     // r times its damping to the housing
 };
 
+// A force on such a mass: its torque changes by −factor · f.
+struct TreeForce {
+    int position = -1, force = -1;
+    double factor = 0;
+};
+
+// A rigid device between two such masses, as far as their group is not grounded: what the child needs passes through.
+struct TreeEdge {
+    int position = -1, parent = -1, unknown = -1;
+    double reciprocal = 0;  // 1/factor in Ĉ, at the child
+    double up = 0;          // and the factor at the parent
+};
+
 // Σ factor q of two groups; the factor is 0 where there is only one.
 struct GroupSlip {
     int group[2] = {};
@@ -125,6 +138,13 @@ struct TreeMode {
     int* end_group = nullptr;
     int* end_position = nullptr;
     double* end_factor = nullptr;
+    int inner_force_count = 0;
+    TreeForce* inner_force = nullptr;
+    int inner_edge_count = 0;
+    TreeEdge* inner_edge = nullptr;  // children first
+    // Where nothing may be left over then: first masses of groups, all masses of grounded ones.
+    int spent_count = 0;
+    int* spent = nullptr;
     // Active rigid edges, children first: position of the child, its factors in Ĉ.
     int edge_count = 0;
     int* edge = nullptr;
@@ -139,13 +159,21 @@ struct TreeMode {
     double* ground_factor = nullptr;
 };
 
-// Memory of one tree mode.
+// Memory of tree modes.
 struct TreeSizes {
-    std::size_t doubles = 0, integers = 0, bytes = 0, masses = 0, slips = 0;
+    std::size_t doubles = 0, integers = 0, bytes = 0, masses = 0, slips = 0, forces = 0, edges = 0;
     explicit TreeSizes(const ModelData& model);
 };
-void place_tree(const ModelData& model, TreeMode& tree, double* doubles, int* integers, unsigned char* bytes,
-                TreeMass* masses, GroupSlip* slips) noexcept;
+struct TreeMemory {
+    double* doubles = nullptr;
+    int* integers = nullptr;
+    unsigned char* bytes = nullptr;
+    TreeMass* masses = nullptr;
+    GroupSlip* slips = nullptr;
+    TreeForce* forces = nullptr;
+    TreeEdge* edges = nullptr;
+};
+void place_tree(const ModelData& model, TreeMode& tree, const TreeMemory& memory) noexcept;
 
 // Fills mode.tree and what a mode says about itself (rows, bound, redundant) from mode.key.
 void build_tree_mode(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
@@ -179,15 +207,16 @@ struct GroupState {
 std::size_t group_state_size(const ModelData& model);  // in doubles
 void place_groups(const ModelData& model, GroupState& groups, double* memory);
 
-// Working memory of a step on the tree, in ScratchData::workspace.
+// Working memory of a step on the tree.
 struct TreeWork {
-    double *momentum, *way, *load, *potential, *speed[3], *swing[4];
-    StageMatrix matrix;              // of a part of a step
-    double *effort[4], *effort_sum;  // by TreeMode::force: of the stages, and weighed together
-    double* auxiliary[4];
-    TreeWork(const ModelData& model, double* memory) SHIFTRIG_REALTIME;
-    static int doubles(const ModelData& model) noexcept;
+    double *momentum = nullptr, *way = nullptr, *load = nullptr, *potential = nullptr, *speed[3] = {},
+           *swing[4] = {};
+    StageMatrix matrix;                             // of a part of a step
+    double *effort[4] = {}, *effort_sum = nullptr;  // by TreeMode::force: of the stages, and weighed together
+    double* auxiliary[4] = {};
 };
+int tree_work_size(const ModelData& model) noexcept;  // in doubles
+void place_tree_work(const ModelData& model, TreeWork& work, double* memory) noexcept;
 
 // q and ψ from z.
 void read_groups(const TreeMode& tree, const double* z, GroupState& groups) SHIFTRIG_REALTIME;

@@ -21,16 +21,18 @@ std::size_t stride(const ModelData& m) {
 TreeSizes::TreeSizes(const ModelData& m) {
     const std::size_t n = stride(m);
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
-    const auto forces = static_cast<std::size_t>(m.forces);
+    forces = 2 * static_cast<std::size_t>(m.forces);
     doubles = (19 + matrix_parts) * n + static_cast<std::size_t>(whole_panels(static_cast<int>(grounds)));
-    integers = 18 * n + 2 * grounds + forces;
+    integers = 19 * n + 2 * grounds + forces / 2;
     bytes = (n + 7) / 8 * 8;
     masses = n;
-    slips = 2 * forces + static_cast<std::size_t>(m.meshes);
+    slips = forces + static_cast<std::size_t>(m.meshes);
+    edges = n;
 }
 
-void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers, unsigned char* bytes,
-                TreeMass* masses, GroupSlip* slips) noexcept {
+void place_tree(const ModelData& m, TreeMode& t, const TreeMemory& memory) noexcept {
+    double* doubles = memory.doubles;
+    int* integers = memory.integers;
     const std::size_t n = stride(m);
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
     for (double** array :
@@ -45,7 +47,7 @@ void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers,
     t.ground_factor = t.end_factor + (2 + matrix_parts) * n;
     for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.head,
                         &t.run_begin, &t.run_parent, &t.speed_slot, &t.twist_slot, &t.mass_group,
-                        &t.shaft_group, &t.up}) {
+                        &t.shaft_group, &t.up, &t.spent}) {
         *array = integers;
         integers += n;
     }
@@ -54,11 +56,13 @@ void place_tree(const ModelData& m, TreeMode& t, double* doubles, int* integers,
     t.ground_position = t.end_position + 2 * n;
     t.ground_unknown = t.ground_position + grounds;
     t.force = t.ground_unknown + grounds;
-    t.grounded = bytes;
-    t.inner = masses;
-    t.force_slip = slips;
-    t.force_share = slips + m.forces;
+    t.grounded = memory.bytes;
+    t.inner = memory.masses;
+    t.force_slip = memory.slips;
+    t.force_share = memory.slips + m.forces;
     t.turning = t.force_share + m.forces;
+    t.inner_force = memory.forces;
+    t.inner_edge = memory.edges;
 }
 
 namespace {
@@ -162,7 +166,7 @@ void find_paths(TreeMode& t) {
 }
 
 // Which masses carry rigid devices, and where q and ψ stand in z.
-void find_masses(const ModelData& m, TreeMode& t) {
+void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
     const TreeTopology& topology = *m.tree;
     unsigned char* rigid = reinterpret_cast<unsigned char*>(t.network_lower);  // not yet in use
     std::fill(rigid, rigid + m.masses, static_cast<unsigned char>(0));
@@ -171,7 +175,7 @@ void find_masses(const ModelData& m, TreeMode& t) {
     for (int p = 0; p < m.masses; ++p) {
         if (t.grounded[t.group[p]]) rigid[p] = 1;
     }
-    t.inner_count = t.end_count = 0;
+    t.inner_count = t.end_count = t.spent_count = t.inner_force_count = t.inner_edge_count = 0;
     for (int p = 0; p < m.masses; ++p) {
         const auto i = static_cast<std::size_t>(p);
         t.mass_group[topology.mass[i]] = t.group[p];
@@ -181,6 +185,20 @@ void find_masses(const ModelData& m, TreeMode& t) {
                 p, t.group[p],
                 t.ratio[p] * m.structure.inertia[static_cast<std::size_t>(topology.mass[i])],
                 t.ratio[p] * topology.ground_damping[i]};
+            if (t.grounded[t.group[p]] || t.first[t.group[p]] == p) t.spent[t.spent_count++] = p;
+        }
+    }
+    for (int e = 0; e < t.edge_count; ++e) {
+        const int p = t.edge[e];
+        if (t.grounded[t.group[p]]) continue;
+        const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
+        t.inner_edge[t.inner_edge_count++] = {p, edge.parent, edge.rigid, 1 / t.edge_own[e], t.edge_up[e]};
+    }
+    for (int k = 0; k < m.forces; ++k) {
+        if (k < m.pairs && mode.key[k]) continue;
+        for (const Link& link : m.force_columns[static_cast<std::size_t>(k)]) {
+            const int p = link.mass < 0 ? -1 : topology.position[static_cast<std::size_t>(link.mass)];
+            if (p >= 0 && rigid[p]) t.inner_force[t.inner_force_count++] = {p, k, link.factor};
         }
     }
     t.exact = true;
@@ -270,7 +288,7 @@ void build_tree_mode(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     find_grounds(m, mode, t);
     weigh_groups(m, mode, t);
     find_paths(t);
-    find_masses(m, t);
+    find_masses(m, mode, t);
     find_forces(m, mode, t);
     if (t.ground_count > 0) factor_network(m, t);
     find_swing(m, t);

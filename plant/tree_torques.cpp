@@ -53,29 +53,29 @@ void solve_network(const ModelData& m, const TreeMode& t, double* load, double* 
 
 }  // namespace
 
-int TreeWork::doubles(const ModelData& m) noexcept {
+int tree_work_size(const ModelData& m) noexcept {
     return (11 + matrix_parts) * stride(m) + 5 * m.forces + 4 * m.auxiliary;
 }
 
-TreeWork::TreeWork(const ModelData& m, double* memory) SHIFTRIG_REALTIME {
+void place_tree_work(const ModelData& m, TreeWork& work, double* memory) noexcept {
     const auto take = [&, length = stride(m)] {
         double* const at = memory + margin;
         memory += length;
         return at;
     };
-    for (double** vector : {&momentum, &way, &load, &potential}) *vector = take();
-    for (double*& vector : speed) vector = take();
-    for (double*& vector : swing) vector = take();
-    place_matrix(matrix, memory, static_cast<std::size_t>(stride(m)));
+    for (double** vector : {&work.momentum, &work.way, &work.load, &work.potential}) *vector = take();
+    for (double*& vector : work.speed) vector = take();
+    for (double*& vector : work.swing) vector = take();
+    place_matrix(work.matrix, memory, static_cast<std::size_t>(stride(m)));
     memory += matrix_parts * stride(m);
     const auto take_row = [&](int length) {
         double* const at = memory;
         memory += length;
         return at;
     };
-    for (double*& vector : effort) vector = take_row(m.forces);
-    effort_sum = take_row(m.forces);
-    for (double*& vector : auxiliary) vector = take_row(m.auxiliary);
+    for (double*& vector : work.effort) vector = take_row(m.forces);
+    work.effort_sum = take_row(m.forces);
+    for (double*& vector : work.auxiliary) vector = take_row(m.auxiliary);
 }
 
 std::size_t group_state_size(const ModelData& m) {
@@ -110,7 +110,7 @@ void complete_groups(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTI
     GroupState& groups = s.groups;
     w.model.tree->kernel.shaft_torques(t.paths, groups.speed, groups.twist, groups.rate, groups.passed,
                                        groups.net);
-    double* const effort = TreeWork(w.model, w.scratch.workspace).effort_sum;
+    double* const effort = w.scratch.tree.effort_sum;
     for (int i = 0; i < t.force_count; ++i) effort[i] = s.f[t.force[i]];
     add_efforts(t, effort, groups.net);
     groups.mode = &mode;
@@ -135,11 +135,10 @@ void group_slips(const ModelData& m, const Mode& mode, const double* speed, Samp
 double rigid_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const GroupState& groups = s.groups;
-    const TreeTopology& topology = *m.tree;
     const TreeMode& t = *mode.tree;
-    TreeWork work(m, w.scratch.workspace);
-    double* load = work.load;  // on each mass that carries rigid devices: M̃ − J ω̇
-    std::fill(s.torque, s.torque + m.torques, 0.);
+    double* const load = w.scratch.tree.load;  // on each mass that carries rigid devices: M̃ − J ω̇
+    double* const torque = s.torque;
+    clear_few(torque, torque + m.torques);
     for (int i = 0; i < t.inner_count; ++i) {
         const TreeMass& mass = t.inner[i];
         const double acceleration = groups.net[mass.group] * t.inverse_mass[mass.group];
@@ -147,38 +146,26 @@ double rigid_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTI
     }
     for (int i = 0; i < t.end_count; ++i)
         load[t.end_position[i]] += t.end_factor[i] * groups.passed[t.end_group[i]];
-    for (int i = 0; t.inner_count > 0 && i < t.force_count; ++i) {
-        const int k = t.force[i];
-        if (s.f[k] == 0) continue;
-        for (const Link& link : m.force_columns[static_cast<std::size_t>(k)]) {
-            if (link.mass >= 0)
-                load[topology.position[static_cast<std::size_t>(link.mass)]] -= link.factor * s.f[k];
-        }
+    for (int i = 0; i < t.inner_force_count; ++i) {
+        const TreeForce& force = t.inner_force[i];
+        load[force.position] -= force.factor * s.f[force.force];
     }
     if (t.ground_count > 0) {
         // Twice: the second pass takes what rounding left of the first.
-        solve_network(m, t, load, work.potential, s.torque);
-        solve_network(m, t, load, work.potential, s.torque);
+        double* const potential = w.scratch.tree.potential;
+        solve_network(m, t, load, potential, torque);
+        solve_network(m, t, load, potential, torque);
     }
-    double scale = 0;
-    for (int e = 0; e < t.edge_count;
-         ++e) {  // children first: what a subtree does not need passes through its edge
-        const int p = t.edge[e];
-        if (t.grounded[t.group[p]]) continue;
-        const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
-        scale = std::max(scale, std::fabs(load[p]));
-        const double moment = load[p] / t.edge_own[e];
-        s.torque[edge.rigid] = moment;
-        load[edge.parent] -= t.edge_up[e] * moment;
+    double scale = 0, rest = 0;
+    for (int e = 0; e < t.inner_edge_count; ++e) {
+        const TreeEdge& edge = t.inner_edge[e];
+        const double moment = load[edge.position] * edge.reciprocal;
+        scale = std::max(scale, std::fabs(load[edge.position]));
+        torque[edge.unknown] = moment;
+        load[edge.parent] -= edge.up * moment;
     }
-    // Nothing may be left over at the groups' first masses, nor anywhere in grounded ones.
-    double rest = 0;
-    for (int i = 0; i < t.inner_count; ++i) {
-        const TreeMass& mass = t.inner[i];
-        if (t.grounded[mass.group] || t.first[mass.group] == mass.position)
-            rest = std::max(rest, std::fabs(load[mass.position]));
-    }
-    for (int k = 0; k < m.pairs; ++k) scale = std::max(scale, std::fabs(s.torque[k]));
+    for (int i = 0; i < t.spent_count; ++i) rest = std::max(rest, std::fabs(load[t.spent[i]]));
+    for (int k = 0; k < m.pairs; ++k) scale = std::max(scale, std::fabs(torque[k]));
     return scale > 0 ? rest / scale : 0;
 }
 
@@ -231,7 +218,7 @@ void tree_mobility(const Work& w, const Mode& mode, const double* impulse, doubl
     const ModelData& m = w.model;
     const TreeTopology& topology = *m.tree;
     const TreeMode& t = *mode.tree;
-    double* sum = TreeWork(m, w.scratch.workspace).momentum;
+    double* sum = w.scratch.tree.momentum;
     std::fill(sum, sum + t.paths.groups, 0.);
     for (int p = 0; p < m.masses; ++p) {
         sum[t.group[p]] += t.force_ratio[p] * impulse[topology.mass[static_cast<std::size_t>(p)]];
