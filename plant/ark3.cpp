@@ -170,36 +170,6 @@ void complete_swing(const TreeKernel& kernel, const TreeMode& t, const TreeWork&
                    end.twist);
 }
 
-// The sample half way, for the search of the instant at which a locked pair gives way.
-void middle_sample(Work& w, const Mode& mode) {
-    Sample &begin = w.scratch.begin, &half = w.scratch.half, &end = w.scratch.end;
-    const double h = end.at.time - begin.at.time;
-    tree_sample_rate(w, mode, begin);
-    tree_sample_rate(w, mode, end);
-    for (int i = 0; i < w.model.states; ++i) {
-        half.z[i] = 0.5 * (begin.z[i] + end.z[i]) + h / 8 * (begin.rate[i] - end.rate[i]);
-    }
-    for (int i = 0; i < w.model.auxiliary; ++i) {
-        half.auxiliary[i] = 0.5 * (begin.auxiliary[i] + end.auxiliary[i]) +
-                            h / 8 * (begin.auxiliary_rate[i] - end.auxiliary_rate[i]);
-    }
-    tree_slips(w.model, mode, half);
-    evaluate_forces(w, w.contact, half);
-}
-
-bool is_overloaded(const Work& w, const Sample& s) {
-    for (int k = 0; k < w.model.pairs; ++k) {
-        if (w.contact[k] == locked && std::fabs(s.torque[k]) > static_limit(w, k, s)) return true;
-    }
-    return false;
-}
-
-void write_state(const ModelData& m, const TreeMode& t, const GroupState& s, double* z) {
-    for (int j = 0; j < m.masses; ++j) z[j] = t.mass_ratio[j] * s.speed[t.mass_group[j]];
-    double* const twist = z + m.masses;
-    for (int e = 0; e < m.twists; ++e) twist[e] = t.shaft_ratio[e] * s.twist[t.shaft_group[e]];
-}
-
 }  // namespace
 
 void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
@@ -256,7 +226,8 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
         for (int j = 0; j < stages; ++j) change += weights[j] * v.auxiliary[j][a];
         end.auxiliary[a] = begin.auxiliary[a] + h * change;
     }
-    write_state(m, t, groups, end.z);
+    kernel.spread(t.mass_group, t.mass_ratio, groups.speed, m.masses, end.z);
+    kernel.spread(t.shaft_group, t.shaft_ratio, groups.twist, m.twists, end.z + m.masses);
     if (!t.exact) read_groups(t, end.z, groups);  // as the next step would, if it had to
     group_slips(m, mode, groups.speed, end);
     end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
@@ -265,7 +236,23 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     s.torque_residual = rigid_torques(w, mode, end);
     const double middle = 0.5 * (from + end_fraction);
     s.half.at = {w.start + middle * w.h, middle, Side::right};
-    if (is_overloaded(w, end)) middle_sample(w, mode);
+}
+
+void tree_half(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+    Sample &begin = w.scratch.begin, &half = w.scratch.half, &end = w.scratch.end;
+    const double h = end.at.time - begin.at.time;
+    tree_sample_rate(w, mode, begin);
+    tree_sample_rate(w, mode, end);
+    for (int i = 0; i < w.model.states; ++i) {
+        half.z[i] = 0.5 * (begin.z[i] + end.z[i]) + h / 8 * (begin.rate[i] - end.rate[i]);
+    }
+    for (int i = 0; i < w.model.auxiliary; ++i) {
+        half.auxiliary[i] = 0.5 * (begin.auxiliary[i] + end.auxiliary[i]) +
+                            h / 8 * (begin.auxiliary_rate[i] - end.auxiliary_rate[i]);
+    }
+    tree_slips(w.model, mode, half);
+    evaluate_forces(w, w.contact, half);
+    internal_torques(w, mode, half);
 }
 
 double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {

@@ -14,8 +14,12 @@ inline constexpr double ark3_gamma = 1767732205903. / 4055673282236;
 inline constexpr double ark3_swing_tolerance = 1e-7, ark3_slow_swing = 2.8e-3;
 
 // As advance() of etd3.h: from the settled `begin` to `end_fraction` of the step in the mode; fills end, with forces
-// and internal torques, and half where a locked pair is overloaded at the end.
+// and internal torques. Of half it knows the time.
 void advance_tree(Work& work, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME;
+
+// The half sample of the part just computed, by Hermite's cubic, for the search of the instant at which a locked pair gives
+// way.
+void tree_half(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
 // The middle sample of the part just computed, as book() of ledger.h needs it, by Hermite's cubic. Returns the energy lost in dampers of shafts and to the housing [J].
 double tree_middle(Work& work, const Mode& mode) SHIFTRIG_REALTIME;

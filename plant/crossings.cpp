@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plant/ark3.h"
 #include "plant/devices.h"
 #include "plant/flanks.h"
 #include "plant/stuck_meshes.h"
@@ -92,10 +93,9 @@ bool is_near_weak_limit(const Work& w, int pair, const Sample& begin, const Samp
            (1 - strained) * std::max(std::fabs(t0), std::fabs(t1));
 }
 
-// What holds half way, and the internal torques there: a stage knows neither. Its coordinates (on a tree, everything but
-// the torques) are there.
+// What holds half way, and the internal torques there: a stage knows neither. Its coordinates are there, but on a tree.
 void complete_half(Work& w, const Mode& mode) {
-    if (mode.tree) return internal_torques(w, mode, w.scratch.half);
+    if (mode.tree) return tree_half(w, mode);
     evaluate_forces(w, w.contact, w.scratch.half);
     active_torques(w.model, mode, w.scratch.half);
 }

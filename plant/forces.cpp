@@ -225,7 +225,12 @@ void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const ContactTable& table = w.operators.table;
     const ScratchData& scratch = w.scratch;
-    copy_few(scratch.held.data(), m.pairs, s.load);
+    const double* const held = scratch.held.data();
+    for (int i = 0; i < table.pressed_count; ++i) {
+        const int k = table.pressed[static_cast<std::size_t>(i)];
+        s.load[k] = held[k];
+    }
+    for (int k = m.actuated_pairs; k < m.pairs; ++k) s.load[k] = held[k];  // to these laws add
     open_drags(w, s);
     law_forces(w, s);
     for (int i = 0; i < table.pressed_count; ++i) {

@@ -97,6 +97,10 @@ struct SwingWork {
 using Correct = void (*)(const TreePaths&, const StageMatrix&, double* momentum, const double* error,
                          double factor, const SwingWork&, double* speed, double* twist) SHIFTRIG_REALTIME;
 
+// values[i] = ratio[i] · of_group[group[i]]
+using Spread = void (*)(const int* group, const double* ratio, const double* of_group, int count,
+                        double* values) SHIFTRIG_REALTIME;
+
 struct TreeKernel {
     ShaftTorques shaft_torques = nullptr;
     Combine combine = nullptr;
@@ -105,6 +109,7 @@ struct TreeKernel {
     Middle middle = nullptr;
     SwingError swing_error = nullptr;
     Correct correct = nullptr;
+    Spread spread = nullptr;
 };
 
 TreeKernel choose_tree_kernel(KernelKind kind);

@@ -295,7 +295,18 @@ void correct(const TreePaths& t, const StageMatrix& stage, double* momentum, con
     }
 }
 
-constexpr TreeKernel kernel{shaft_torques, combine, solve, finish, middle, swing_error, correct};
+void spread(const int* group, const double* ratio, const double* of_group, int count,
+            double* values) SHIFTRIG_REALTIME {
+    int i = 0;
+    for (; i + lanes <= count; i += lanes) {
+        const int* const from = group + i;
+        const Block gathered = {of_group[from[0]], of_group[from[1]], of_group[from[2]], of_group[from[3]]};
+        write(values + i, read(ratio + i) * gathered);
+    }
+    for (; i < count; ++i) values[i] = ratio[i] * of_group[group[i]];
+}
+
+constexpr TreeKernel kernel{shaft_torques, combine, solve, finish, middle, swing_error, correct, spread};
 
 }  // namespace
 }  // namespace shiftrig::plant::detail

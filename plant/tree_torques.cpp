@@ -142,7 +142,11 @@ double rigid_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTI
     for (int i = 0; i < t.inner_count; ++i) {
         const TreeMass& mass = t.inner[i];
         const double acceleration = groups.net[mass.group] * t.inverse_mass[mass.group];
-        load[mass.position] = -mass.drag * groups.speed[mass.group] - mass.inertia * acceleration;
+        load[mass.position] = -mass.inertia * acceleration;
+    }
+    for (int i = 0; t.paths.drags && i < t.inner_count; ++i) {
+        const TreeMass& mass = t.inner[i];
+        load[mass.position] -= mass.drag * groups.speed[mass.group];
     }
     for (int i = 0; i < t.end_count; ++i)
         load[t.end_position[i]] += t.end_factor[i] * groups.passed[t.end_group[i]];
@@ -186,9 +190,8 @@ void tree_slips(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTI
 
 void tree_swings(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const TreeMode& t = *mode.tree;
-    const double* const rate = groups_of(w, mode, s).rate;
-    for (int e = 0, count = w.model.twists; e < count; ++e)
-        s.swing[e] = t.shaft_ratio[e] * rate[t.shaft_group[e]];
+    w.model.tree->kernel.spread(t.shaft_group, t.shaft_ratio, groups_of(w, mode, s).rate, w.model.twists,
+                                s.swing);
 }
 
 void tree_sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
