@@ -122,49 +122,34 @@ StageSums stage_sums(const Impulse& impulse, const double (&ways)[stages], int c
     return sums;
 }
 
-void add_weighed_efforts(const TreeMode& t, const double (&shares)[stages], int count, const TreeWork& v,
-                         double h, double* momentum) {
-    double* __restrict sum = v.effort_sum;
-    const int forces = t.force_count;
-    for (int k = 0; k < forces; ++k) sum[k] = h * shares[0] * v.effort[0][k];
-    for (int j = 1; j < count; ++j) {
-        const double weight = h * shares[j];
-        const double* const effort = v.effort[j];
-        for (int k = 0; k < forces; ++k) sum[k] += weight * effort[k];
-    }
-    add_efforts(t, sum, momentum);
-}
-
-// The same on speeds.
-void add_speeds(const TreeMode& t, const double (&shares)[stages], const TreeWork& v, double h,
-                double* speed) {
+// What the forces of so many stages give to the groups: Σ h share_j Q_j goes to `give`, by group.
+template <typename Give>
+void give_efforts(const TreeMode& t, const double (&shares)[stages], int count, const TreeWork& v, double h,
+                  const Give& give) {
+    const GroupPairs& share = t.force_share;
     for (int i = 0; i < t.force_count; ++i) {
-        double effort = 0;
-        for (int j = 0; j < stages; ++j) effort += shares[j] * v.effort[j][i];
-        effort *= h;
-        const GroupSlip& share = t.force_share[i];
-        for (int side = 0; side < 2; ++side) {
-            const int g = share.group[side];
-            speed[g] -= share.factor[side] * effort * t.inverse_mass[g];
-        }
+        const int k = t.force[i];
+        double effort = shares[0] * v.effort[0][k];
+        for (int j = 1; j < count; ++j) effort += shares[j] * v.effort[j][k];
+        effort *= -h;
+        give(share.first[i], share.of_first[i] * effort);
+        give(share.second[i], share.of_second[i] * effort);
     }
-}
-
-void keep_efforts(const TreeMode& t, const Sample& s, double* effort) {
-    for (int i = 0; i < t.force_count; ++i) effort[i] = s.f[t.force[i]];
 }
 
 // Where shafts swing, makes the linear part of the step one of order 4. hL/(1 − hγL)² in place of hL: the same to that
 // order, nothing where hω is large, and the step stays L-stable. With S = (1 − hγL)⁻¹, which a stage solves with,
 // it is (S² − S)/γ.
-void complete_swing(const TreeKernel& kernel, const TreeMode& t, const TreeWork& v, double h,
+void complete_swing(const ModelData& m, const TreeMode& t, const TreeWork& v, double h,
                     const StageMatrix& stage, const GroupState& begin, GroupState& end) {
+    const TreeKernel& kernel = m.tree->kernel;
     const StageSums sums = stage_sums(swing_impulse, embedded_error, stages, begin, v, h);
     double* const error = v.swing[0];
     const Swing swing = kernel.swing_error(t.paths, sums, v.way, error);
     if (!(swing.error > ark3_swing_tolerance * h * std::max(swing.fastest, at_rest))) return;
     kernel.combine(t.paths, sums, v.momentum, v.way);
-    add_weighed_efforts(t, swing_impulse.effort, stages, v, h, v.momentum);
+    give_efforts(t, swing_impulse.effort, stages, v, h,
+                 [&](int g, double impulse) { v.momentum[g] += impulse; });
     constexpr double factor = -excess / embedded / gamma;
     kernel.correct(t.paths, stage, v.momentum, error, factor, {v.swing[1], v.swing[2], v.swing[3]}, end.speed,
                    end.twist);
@@ -178,7 +163,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     const TreeMode& t = *mode.tree;
     const TreeKernel& kernel = m.tree->kernel;
     TreeWork& v = s.tree;
-    Sample &begin = s.begin, &late = s.late, &end = s.end;
+    Sample &begin = s.begin, &end = s.end;
     const double from = begin.at.fraction, length = end_fraction - from;
     const double h = length * w.h;
     const bool whole = from == 0 && end_fraction == 1;
@@ -190,12 +175,14 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
 
     tabulate_contact(w, mode);
     const GroupState& start = groups_of(w, mode, begin);
-    keep_efforts(t, begin, v.effort[0]);
+    v.effort[0] = begin.f;
+    Sample& late = s.late;  // of each stage in turn, its f kept
     copy_few(begin.auxiliary_rate, m.auxiliary, v.auxiliary[0]);
     for (int i = 1; i < stages; ++i) {
         kernel.combine(t.paths, stage_sums(impulses.star[i], implicit_table[i], i, start, v, h), v.momentum,
                        v.way);
-        add_weighed_efforts(t, impulses.star[i].effort, i, v, h, v.momentum);
+        give_efforts(t, impulses.star[i].effort, i, v, h,
+                     [&](int g, double impulse) { v.momentum[g] += impulse; });
         double* const speed = v.speed[i - 1];
         kernel.solve(t.paths, matrix, v.momentum, {start.twist, v.way}, speed);
 
@@ -208,8 +195,8 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
             late.auxiliary[a] = begin.auxiliary[a] + h * change;
         }
         group_slips(m, mode, speed, late);
+        v.effort[i] = late.f = v.stage_effort[i - 1];
         stage_forces(w, late);
-        keep_efforts(t, late, v.effort[i]);
         copy_few(late.auxiliary_rate, m.auxiliary, v.auxiliary[i]);
     }
 
@@ -219,8 +206,9 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
                   groups.twist);
     double lacks[stages];
     for (int j = 0; j < stages; ++j) lacks[j] = weights[j] - explicit_table[stages - 1][j];
-    add_speeds(t, lacks, v, h, groups.speed);
-    if (t.swings) complete_swing(kernel, t, v, h, matrix, start, groups);
+    give_efforts(t, lacks, stages, v, h,
+                 [&](int g, double impulse) { groups.speed[g] += impulse * t.inverse_mass[g]; });
+    if (t.swings) complete_swing(m, t, v, h, matrix, start, groups);
     for (int a = 0; a < m.auxiliary; ++a) {
         double change = 0;
         for (int j = 0; j < stages; ++j) change += weights[j] * v.auxiliary[j][a];

@@ -19,6 +19,17 @@ struct SpeedCheck {
     int speeds = 0;
 };
 
+// Friction of so many pairs (laws/friction.h, laws/oil.h) in their contact states: the factor is
+// base + rise · exp(−|slip| · inverse_speed).
+struct FrictionTerms {
+    const double *load = nullptr, *slip = nullptr;
+    const double *sense = nullptr, *drag = nullptr;
+    const double *base = nullptr, *rise = nullptr, *inverse_speed = nullptr, *static_factor = nullptr;
+    bool fades = false;  // some rise is not 0
+    double drag_limit = 0;
+    int pairs = 0;
+};
+
 // Simpson's rule over powers: forces on speeds, torques of meshes on what their losses turn, dampers on their rates.
 struct PowerTerms {
     const double *force[3] = {}, *slip[3] = {};
@@ -71,12 +82,11 @@ struct DeviceLoops {
     bool (*senses_hold)(const SpeedCheck& check) SHIFTRIG_REALTIME = nullptr;
     // May one have been least somewhere between begin and end?
     bool (*may_dip)(const SpeedCheck& check) SHIFTRIG_REALTIME = nullptr;
-    // Capacities at rest from loads.
-    void (*press)(const double* load, const double* static_factor, const double* sliding_factor, int pairs,
-                  double* holding, double* sliding) SHIFTRIG_REALTIME = nullptr;
-    // f = factor · slip, slip within ± limit.
-    void (*drag)(const double* factor, double limit, const double* slip, int pairs,
-                 double* f) SHIFTRIG_REALTIME = nullptr;
+    // Forces of the pairs: drag · slip, slip within ± drag_limit, and sense · load · factor.
+    void (*slide)(const FrictionTerms& terms, double* f) SHIFTRIG_REALTIME = nullptr;
+    // The same, and what each holds and passes: load · static_factor, load · factor.
+    void (*press)(const FrictionTerms& terms, double* f, double* holding,
+                  double* sliding) SHIFTRIG_REALTIME = nullptr;
     // Over h; adds the work of each force to work[k].
     Work3 (*book)(const PowerTerms& terms, double h, double* work) SHIFTRIG_REALTIME = nullptr;
     void (*subtract)(const double* a, const double* b, int count,

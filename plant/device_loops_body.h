@@ -61,21 +61,55 @@ bool may_dip(const SpeedCheck& c) SHIFTRIG_REALTIME {
     return any(close);
 }
 
-void press(const double* load, const double* static_factor, const double* sliding_factor, int pairs,
-           double* holding, double* sliding) SHIFTRIG_REALTIME {
-    for (int k = 0; k < pairs; k += lanes) {
-        const Lanes pressed = read(load + k);
-        write(holding + k, pressed * read(static_factor + k));
-        write(sliding + k, pressed * read(sliding_factor + k));
-    }
+// math/elementary.h's, bit for bit, of what is not above 0.
+inline Lanes exp_below(const Lanes& x) noexcept {
+    constexpr double least = -745.2, inverse_ln2 = 0x1.71547652b82fep0, shift = 0x1.8p52;
+    constexpr double ln2_high = 0x1.62e42fefa38p-1, ln2_low = 0x1.ef35793c7673p-45;
+    const Lanes all = Lanes{} + least, bounded = x < all ? all : x;
+    const Lanes shifted = bounded * inverse_ln2 + shift, k = shifted - shift;
+    const Lanes high = bounded - k * ln2_high, low = k * ln2_low;
+    const Lanes r = high - low, r2 = r * r, r4 = r2 * r2;
+    const Lanes p0 = (1.0 / 2 + r * (1.0 / 6)) + r2 * (1.0 / 24 + r * (1.0 / 120));
+    const Lanes p1 = (1.0 / 720 + r * (1.0 / 5040)) + r2 * (1.0 / 40320 + r * (1.0 / 362880));
+    const Lanes p2 =
+        (1.0 / 3628800 + r * (1.0 / 39916800)) + r2 * (1.0 / 479001600 + r * (1.0 / 6227020800.0));
+    const Lanes p = p0 + r4 * (p1 + r4 * p2);
+    const Lanes e = 1. + (high - (low - r2 * p));
+    // In two factors, of which the first rounds nothing: the result may be subnormal.
+    const Marks n = reinterpret_cast<Marks>(shifted) - reinterpret_cast<Marks>(Lanes{} + shift);
+    const Marks half = n >> 1;
+    const auto power_of_two = [](const Marks& exponent) {
+        return reinterpret_cast<Lanes>((exponent + 1023) << 52);
+    };
+    return where(~(x < all), e * power_of_two(half) * power_of_two(n - half));
 }
 
-void drag(const double* factor, double limit, const double* slip, int pairs, double* f) SHIFTRIG_REALTIME {
-    const Lanes most = Lanes{} + limit;
-    for (int k = 0; k < pairs; k += lanes) {
-        const Lanes v = read(slip + k), capped = v > most ? most : v;
-        write(f + k, read(factor + k) * (capped < -most ? -most : capped));
+template <bool complete>
+inline void slide_pairs(const FrictionTerms& t, double* f, double* holding, double* sliding) noexcept {
+    const Lanes most = Lanes{} + t.drag_limit;
+    for (int k = 0; k < t.pairs; k += lanes) {
+        const Lanes slip = read(t.slip + k), load = read(t.load + k);
+        Lanes factor = read(t.base + k);
+        if (t.fades) factor += read(t.rise + k) * exp_below(-magnitude(slip) * read(t.inverse_speed + k));
+        const Lanes passed = load * factor;
+        const Lanes capped = slip > most ? most : slip;
+        const Lanes drag = read(t.drag + k) * (capped < -most ? -most : capped);
+        const Lanes force = drag + read(t.sense + k) * passed;
+        if (k + lanes <= t.pairs) {
+            write(f + k, force);
+        } else {  // the next ones are others' forces
+            for (int i = 0; k + i < t.pairs; ++i) f[k + i] = force[i];
+        }
+        if (!complete) continue;
+        write(sliding + k, passed);
+        write(holding + k, load * read(t.static_factor + k));
     }
+}
+void slide(const FrictionTerms& t, double* f) SHIFTRIG_REALTIME {
+    slide_pairs<false>(t, f, nullptr, nullptr);
+}
+void press(const FrictionTerms& t, double* f, double* holding, double* sliding) SHIFTRIG_REALTIME {
+    slide_pairs<true>(t, f, holding, sliding);
 }
 
 Work3 book(const PowerTerms& t, double h, double* work) SHIFTRIG_REALTIME {
@@ -231,6 +265,6 @@ double* show_shafts(const ShaftValues& s, double* next) SHIFTRIG_REALTIME {
     return twist + s.count;
 }
 
-constexpr DeviceLoops device_loops{senses_hold,      may_dip,         press, drag, book, subtract,
-                                   share_of_squares, weighted_square, same,  copy, heat, pick_up,
+constexpr DeviceLoops device_loops{senses_hold,      may_dip,         slide, press, book, subtract,
+                                   share_of_squares, weighted_square, same,  copy,  heat, pick_up,
                                    show_clutches,    show_shafts};

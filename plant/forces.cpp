@@ -13,33 +13,47 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-// Viscous drag of an open wet clutch.
-double open_drag(const Work& w, int k, const Sample& s) noexcept {
-    return drag_torque(w.model.pair_laws[static_cast<std::size_t>(k)].drag, w.operators.oil.viscosity,
-                       s.slip[k], w.model.description.oil->drag_speed_limit);
+// Viscous drag of an open wet clutch, and what a slipping pair passes on.
+double pair_force(const Work& w, int k, unsigned char state, const Sample& s) noexcept {
+    const double drag = state == free_running ? w.model.pair_laws[static_cast<std::size_t>(k)].drag : 0;
+    return drag_torque(drag, w.operators.oil.viscosity, s.slip[k], w.model.drag_speed_limit) +
+           slip_sign(state) * s.sliding[k];
 }
 
 // Capacities and force of every pair from its load, [Algin] eq. (11).
 void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
     const ModelData& m = w.model;
-    const PairLaw* laws = m.pair_laws.data();
-    const double *const static_factor = m.static_factor.data(), *const sliding_at_rest =
-                                                                    m.sliding_at_rest.data();
-    const double* const load = s.load;
-    double* __restrict holding = s.holding, * __restrict sliding = s.sliding;
-    const int pairs = m.pairs;
-    for (int k = 0; k < pairs; ++k) {
-        holding[k] = load[k] * static_factor[k];
-        sliding[k] = load[k] * sliding_at_rest[k];
+    for (int k = 0; k < m.pairs; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        s.holding[k] = s.load[k] * m.static_factor[i];
+        // One that is about to engage shows what it would pass.
+        s.sliding[k] = contact[k] == locked || s.load[k] == 0
+                           ? s.load[k] * m.sliding_at_rest[i]
+                           : sliding_capacity(m.pair_laws[i].friction, s.load[k], s.slip[k]);
+        s.f[k] = pair_force(w, k, contact[k], s);
     }
-    for (int k = 0; k < pairs; ++k) {
-        if (contact[k] == locked) continue;
-        if (s.load[k] != 0) {  // one that is about to engage shows what it would pass
-            s.sliding[k] = sliding_capacity(laws[k].friction, s.load[k], s.slip[k]);
-            s.f[k] = slip_sign(contact[k]) * s.sliding[k];
-        } else if (contact[k] == free_running && laws[k].drag > 0) {
-            s.f[k] = open_drag(w, k, s);
+}
+
+// The same for the contact states in force, from their table.
+FrictionTerms friction_terms(const Work& w, const Sample& s) noexcept {
+    const ModelData& m = w.model;
+    const ContactTable& table = w.operators.table;
+    return {s.load,     s.slip,     table.sense,         table.drag,
+            table.base, table.rise, table.inverse_speed, m.static_factor.data(),
+            table.fades, m.drag_speed_limit, m.pairs};
+}
+
+// Of pairs whose friction factor is a table.
+void tabled_forces(const Work& w, Sample& s, bool complete) noexcept {
+    for (const int k : w.model.tabled_pairs) {
+        if (w.contact[k] == locked) {
+            if (complete) s.sliding[k] = s.load[k] * w.model.sliding_at_rest[static_cast<std::size_t>(k)];
+            continue;
         }
+        const FrictionLaw& law = w.model.pair_laws[static_cast<std::size_t>(k)].friction;
+        const double sliding = s.load[k] == 0 ? 0 : sliding_capacity(law, s.load[k], s.slip[k]);
+        if (complete) s.sliding[k] = sliding;
+        s.f[k] += w.operators.table.sense[k] * sliding;
     }
 }
 
@@ -119,19 +133,17 @@ namespace {
 
 void load_pairs(const Work& w, Sample& s) noexcept {
     const ScratchData& scratch = w.scratch;
-    copy_few(scratch.held.data(), w.model.pairs, s.load);
+    w.model.kernel.loops.copy(scratch.held.data(), w.model.pairs, s.load);
     for (int i = 0; i < scratch.moving_count; ++i) {
         const int k = scratch.moving[static_cast<std::size_t>(i)];
         s.load[k] = pair_load(w, k, s.at);
     }
 }
 
-// What open clutches drag; all other forces 0 for now.
-void open_drags(const Work& w, Sample& s) noexcept {
-    const ModelData& m = w.model;
-    const ContactTable& table = w.operators.table;
-    if (table.drags) m.kernel.loops.drag(table.drag, m.drag_speed_limit, s.slip, m.pairs, s.f);
-    clear_few(table.drags ? s.f + m.pairs : s.f, s.f + m.forces);
+// Those alone to which the laws below add.
+void load_by_nature(const Work& w, Sample& s) noexcept {
+    const double* const held = w.scratch.held.data();
+    for (int k = w.model.actuated_pairs; k < w.model.pairs; ++k) s.load[k] = held[k];
 }
 
 // Torques that no contact state concerns, rates of the auxiliary states, and what the laws press together, added to
@@ -174,7 +186,7 @@ void law_forces(const Work& w, Sample& s) noexcept {
         rate[1] = drive.rate.boost;
         *engine_torque_shown++ = drive.torque;
         f[law.force] += drive.torque;
-        load[law.pair] = stalled_friction_capacity(*engine, *mode, speed);
+        if (law.pair >= 0) load[law.pair] = stalled_friction_capacity(*engine, *mode, speed);
         auxiliary += 2;
         rate += 2;
         ++engine;
@@ -223,22 +235,13 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHI
 
 void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    const ContactTable& table = w.operators.table;
-    const ScratchData& scratch = w.scratch;
-    const double* const held = scratch.held.data();
-    for (int i = 0; i < table.pressed_count; ++i) {
-        const int k = table.pressed[static_cast<std::size_t>(i)];
-        s.load[k] = held[k];
-    }
-    for (int k = m.actuated_pairs; k < m.pairs; ++k) s.load[k] = held[k];  // to these laws add
-    open_drags(w, s);
+    const bool acts = w.operators.table.acts;
+    acts ? load_pairs(w, s) : load_by_nature(w, s);
+    clear_few(acts ? s.f + m.pairs : s.f, s.f + m.forces);
     law_forces(w, s);
-    for (int i = 0; i < table.pressed_count; ++i) {
-        const int k = table.pressed[static_cast<std::size_t>(i)];
-        const auto at = static_cast<std::size_t>(k);
-        if (scratch.moves[at]) s.load[k] = pair_load(w, k, s.at);
-        if (s.load[k] == 0) continue;
-        s.f[k] = table.sense[k] * sliding_capacity(m.pair_laws[at].friction, s.load[k], s.slip[k]);
+    if (acts) {
+        m.kernel.loops.slide(friction_terms(w, s), s.f);
+        tabled_forces(w, s, false);
     }
     weak_forces(w, w.contact, s);
     flank_forces(w, w.contact, s);
@@ -247,31 +250,18 @@ void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
 
 void end_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    const ContactTable& table = w.operators.table;
     load_pairs(w, s);
-    open_drags(w, s);
+    clear_few(s.f + m.pairs, s.f + m.forces);
     law_forces(w, s);
-    m.kernel.loops.press(s.load, m.static_factor.data(), m.sliding_at_rest.data(), m.pairs, s.holding,
-                         s.sliding);
-    for (int i = 0; i < table.pressed_count; ++i) {
-        const int k = table.pressed[static_cast<std::size_t>(i)];
-        if (s.load[k] == 0) continue;
-        s.sliding[k] =
-            sliding_capacity(m.pair_laws[static_cast<std::size_t>(k)].friction, s.load[k], s.slip[k]);
-        s.f[k] = table.sense[k] * s.sliding[k];
-    }
+    m.kernel.loops.press(friction_terms(w, s), s.f, s.holding, s.sliding);
+    tabled_forces(w, s, true);
     weak_forces(w, w.contact, s);
     flank_forces(w, w.contact, s);
     bearing_forces(w, w.contact, s);
 }
 
 void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIFTRIG_REALTIME {
-    const ModelData& m = w.model;
-    for (int k = 0; k < m.pairs; ++k) {
-        s.f[k] = slip_sign(contact[k]) * s.sliding[k];
-        if (contact[k] == free_running && m.pair_laws[static_cast<std::size_t>(k)].drag > 0)
-            s.f[k] = open_drag(w, k, s);
-    }
+    for (int k = 0; k < w.model.pairs; ++k) s.f[k] = pair_force(w, k, contact[k], s);
     weak_forces(w, contact, s);
     flank_forces(w, contact, s);
     bearing_forces(w, contact, s);

@@ -124,7 +124,6 @@ struct OperatorsData {
     std::vector<Mode> modes;
     std::vector<TreeMode> trees;  // one per mode where the model has a tree
     std::vector<TreeMass> tree_masses;
-    std::vector<GroupSlip> group_slips;
     std::vector<TreeForce> tree_forces;
     std::vector<TreeEdge> tree_edges;
     std::uint64_t clock = 0;

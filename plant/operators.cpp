@@ -99,14 +99,13 @@ void OperatorsData::place_trees(const ModelData& m) {
     integers.assign(modes.size() * sizes.integers, 0);
     bytes.assign(modes.size() * sizes.bytes, 0);
     tree_masses.resize(modes.size() * sizes.masses);
-    group_slips.resize(modes.size() * sizes.slips);
     tree_forces.resize(modes.size() * sizes.forces);
     tree_edges.resize(modes.size() * sizes.edges);
     for (std::size_t i = 0; i < modes.size(); ++i) {
         place_tree(m, trees[i],
                    {memory.data()->value + i * sizes.doubles, integers.data() + i * sizes.integers,
                     bytes.data() + i * sizes.bytes, tree_masses.data() + i * sizes.masses,
-                    group_slips.data() + i * sizes.slips, tree_forces.data() + i * sizes.forces,
+                    tree_forces.data() + i * sizes.forces,
                     tree_edges.data() + i * sizes.edges});
         modes[i].tree = &trees[i];
     }

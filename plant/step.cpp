@@ -146,7 +146,6 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     // Commands as they act; valves, pistons and pedals over the whole step.
     latch_inputs(w, inputs);
     advance_actuation(w);
-    doubt_table(w);
 
     // Torque capacities, external torques, internal torques, power-flow directions, internal torques with
     // losses ([Algin] eq. (11), (14), (15), (16)–(25)); what cannot hold at t0+ opens (eq. (12)).
@@ -227,7 +226,6 @@ void observe(const Model& model, Operators& operators, const State& state, const
     Work w = begin_look(model.data(), operators.data(), state, outputs, scratch.data());
     latch_inputs(w, inputs);
     hold_actuation(w);
-    doubt_table(w);
     const Mode& mode = settle(w, w.scratch.begin);
     finish_look(w, mode);
 }

@@ -79,15 +79,6 @@ struct TreeEdge {
     double up = 0;          // and the factor at the parent
 };
 
-// Σ factor q of two groups; the factor is 0 where there is only one.
-struct GroupSlip {
-    int group[2] = {};
-    double factor[2] = {};
-    double of(const double* speed) const noexcept {
-        return factor[0] * speed[group[0]] + factor[1] * speed[group[1]];
-    }
-};
-
 // One contact mode on the tree: arrays by position and by group, in one block of memory.
 struct TreeMode {
     TreePaths paths;                // groups, their masses and links, as the inner loops see them
@@ -128,9 +119,8 @@ struct TreeMode {
     // groups.
     int force_count = 0;
     int* force = nullptr;
-    GroupSlip* force_slip = nullptr;
-    GroupSlip* force_share = nullptr;  // factors r̂: the group's momentum changes by −factor · f
-    GroupSlip* turning = nullptr;      // per mesh, of what its loss acts on
+    GroupPairs force_slip, force_share;  // the shares with factors r̂: the group's momentum changes by −factor · f
+    GroupPairs turning;                  // per mesh, of what its loss acts on
     // Masses of groups with rigid devices inside, and the link torques that act on them.
     int inner_count = 0;
     TreeMass* inner = nullptr;
@@ -161,7 +151,7 @@ struct TreeMode {
 
 // Memory of tree modes.
 struct TreeSizes {
-    std::size_t doubles = 0, integers = 0, bytes = 0, masses = 0, slips = 0, forces = 0, edges = 0;
+    std::size_t doubles = 0, integers = 0, bytes = 0, masses = 0, forces = 0, edges = 0;
     explicit TreeSizes(const ModelData& model);
 };
 struct TreeMemory {
@@ -169,7 +159,6 @@ struct TreeMemory {
     int* integers = nullptr;
     unsigned char* bytes = nullptr;
     TreeMass* masses = nullptr;
-    GroupSlip* slips = nullptr;
     TreeForce* forces = nullptr;
     TreeEdge* edges = nullptr;
 };
@@ -212,7 +201,8 @@ struct TreeWork {
     double *momentum = nullptr, *way = nullptr, *load = nullptr, *potential = nullptr, *speed[3] = {},
            *swing[4] = {};
     StageMatrix matrix;                             // of a part of a step
-    double *effort[4] = {}, *effort_sum = nullptr;  // by TreeMode::force: of the stages, and weighed together
+    const double* effort[4] = {};  // f of the stages,
+    double* stage_effort[3] = {};  // of which these are those after the first
     double* auxiliary[4] = {};
 };
 int tree_work_size(const ModelData& model) noexcept;  // in doubles
@@ -227,8 +217,8 @@ const GroupState& groups_of(const Work& work, const Mode& mode, Sample& sample) 
 // Slips of forces and meshes from q.
 void group_slips(const ModelData& model, const Mode& mode, const double* speed,
                  Sample& sample) SHIFTRIG_REALTIME;
-// Adds what these forces, in the order of TreeMode::force, give to the groups.
-void add_efforts(const TreeMode& tree, const double* effort, double* sum) SHIFTRIG_REALTIME;
+// Adds what forces give to the groups.
+void add_efforts(const TreeMode& tree, const double* f, double* sum) SHIFTRIG_REALTIME;
 
 // Internal torques of the sample from its groups; returns their residual relative to the largest torque.
 double rigid_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;

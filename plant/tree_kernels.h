@@ -97,6 +97,15 @@ struct SwingWork {
 using Correct = void (*)(const TreePaths&, const StageMatrix&, double* momentum, const double* error,
                          double factor, const SwingWork&, double* speed, double* twist) SHIFTRIG_REALTIME;
 
+// What belongs to one or two groups each: the factor is 0 where there is only one.
+struct GroupPairs {
+    int *first = nullptr, *second = nullptr;
+    double *of_first = nullptr, *of_second = nullptr;
+};
+// values[place[i]] = of_first · that of the first group + of_second · that of the second
+using Slips = void (*)(const GroupPairs&, const double* of_group, const int* place, int count,
+                       double* values) SHIFTRIG_REALTIME;
+
 // values[i] = ratio[i] · of_group[group[i]]
 using Spread = void (*)(const int* group, const double* ratio, const double* of_group, int count,
                         double* values) SHIFTRIG_REALTIME;
@@ -109,6 +118,7 @@ struct TreeKernel {
     Middle middle = nullptr;
     SwingError swing_error = nullptr;
     Correct correct = nullptr;
+    Slips slips = nullptr;
     Spread spread = nullptr;
 };
 

@@ -295,18 +295,38 @@ void correct(const TreePaths& t, const StageMatrix& stage, double* momentum, con
     }
 }
 
+inline Block gather(const double* values, const int* from) noexcept {
+    return Block{values[from[0]], values[from[1]], values[from[2]], values[from[3]]};
+}
+
+void slips(const GroupPairs& pairs, const double* of_group, const int* place, int count,
+           double* values) SHIFTRIG_REALTIME {
+    int i = 0;
+    for (; i + lanes <= count; i += lanes) {
+        const Block slip = read(pairs.of_first + i) * gather(of_group, pairs.first + i) +
+                           read(pairs.of_second + i) * gather(of_group, pairs.second + i);
+        if (place[i + lanes - 1] - place[i] == lanes - 1) {  // places rise
+            write(values + place[i], slip);
+        } else {
+            for (int j = 0; j < lanes; ++j) values[place[i + j]] = slip[j];
+        }
+    }
+    for (; i < count; ++i) {
+        values[place[i]] =
+            pairs.of_first[i] * of_group[pairs.first[i]] + pairs.of_second[i] * of_group[pairs.second[i]];
+    }
+}
+
 void spread(const int* group, const double* ratio, const double* of_group, int count,
             double* values) SHIFTRIG_REALTIME {
     int i = 0;
     for (; i + lanes <= count; i += lanes) {
-        const int* const from = group + i;
-        const Block gathered = {of_group[from[0]], of_group[from[1]], of_group[from[2]], of_group[from[3]]};
-        write(values + i, read(ratio + i) * gathered);
+        write(values + i, read(ratio + i) * gather(of_group, group + i));
     }
     for (; i < count; ++i) values[i] = ratio[i] * of_group[group[i]];
 }
 
-constexpr TreeKernel kernel{shaft_torques, combine, solve, finish, middle, swing_error, correct, spread};
+constexpr TreeKernel kernel{shaft_torques, combine, solve, finish, middle, swing_error, correct, slips, spread};
 
 }  // namespace
 }  // namespace shiftrig::plant::detail

@@ -16,17 +16,22 @@ std::size_t stride(const ModelData& m) {
     return static_cast<std::size_t>(whole_panels(m.masses + 1));
 }
 
+// Of one array by force or mesh.
+std::size_t pair_stride(const ModelData& m) {
+    return static_cast<std::size_t>(whole_panels(std::max(m.forces, m.meshes)));
+}
+
 }  // namespace
 
 TreeSizes::TreeSizes(const ModelData& m) {
     const std::size_t n = stride(m);
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
     forces = 2 * static_cast<std::size_t>(m.forces);
-    doubles = (19 + matrix_parts) * n + static_cast<std::size_t>(whole_panels(static_cast<int>(grounds)));
-    integers = 19 * n + 2 * grounds + forces / 2;
+    const std::size_t pairs = pair_stride(m);
+    doubles = (19 + matrix_parts) * n + 6 * pairs + static_cast<std::size_t>(whole_panels(static_cast<int>(grounds)));
+    integers = 19 * n + 2 * grounds + 7 * pairs;
     bytes = (n + 7) / 8 * 8;
     masses = n;
-    slips = forces + static_cast<std::size_t>(m.meshes);
     edges = n;
 }
 
@@ -44,7 +49,8 @@ void place_tree(const ModelData& m, TreeMode& t, const TreeMemory& memory) noexc
     }
     t.end_factor = doubles;  // two ends of every link
     place_matrix(t.matrix, t.end_factor + 2 * n, n);
-    t.ground_factor = t.end_factor + (2 + matrix_parts) * n;
+    const std::size_t pairs = pair_stride(m);
+    t.ground_factor = t.end_factor + (2 + matrix_parts) * n + 6 * pairs;
     for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.head,
                         &t.run_begin, &t.run_parent, &t.speed_slot, &t.twist_slot, &t.mass_group,
                         &t.shaft_group, &t.up, &t.spent}) {
@@ -56,11 +62,15 @@ void place_tree(const ModelData& m, TreeMode& t, const TreeMemory& memory) noexc
     t.ground_position = t.end_position + 2 * n;
     t.ground_unknown = t.ground_position + grounds;
     t.force = t.ground_unknown + grounds;
+    double* pair_factor = t.end_factor + (2 + matrix_parts) * n;
+    int* pair_group = t.force + pairs;
+    for (GroupPairs* list : {&t.force_slip, &t.force_share, &t.turning}) {
+        *list = {pair_group, pair_group + pairs, pair_factor, pair_factor + pairs};
+        pair_group += 2 * pairs;
+        pair_factor += 2 * pairs;
+    }
     t.grounded = memory.bytes;
     t.inner = memory.masses;
-    t.force_slip = memory.slips;
-    t.force_share = memory.slips + m.forces;
-    t.turning = t.force_share + m.forces;
     t.inner_force = memory.forces;
     t.inner_edge = memory.edges;
 }
@@ -230,16 +240,15 @@ void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
 }
 
 // Each link's group, with its factor times that of its position.
-GroupSlip on_groups(const ModelData& m, const TreeMode& t, const std::array<Link, 2>& links,
-                    const double* by_position) {
-    GroupSlip slip;
-    for (std::size_t i = 0; i < 2; ++i) {
-        if (links[i].mass < 0) continue;
-        const int p = m.tree->position[static_cast<std::size_t>(links[i].mass)];
-        slip.group[i] = t.group[p];
-        slip.factor[i] = by_position[p] * links[i].factor;
-    }
-    return slip;
+void set_groups(const ModelData& m, const TreeMode& t, const std::array<Link, 2>& links,
+                const double* by_position, int place, GroupPairs& pairs) {
+    const auto set = [&](const Link& link, int& group, double& factor) {
+        const int p = link.mass < 0 ? 0 : m.tree->position[static_cast<std::size_t>(link.mass)];
+        group = t.group[p];
+        factor = link.mass < 0 ? 0 : by_position[p] * link.factor;
+    };
+    set(links[0], pairs.first[place], pairs.of_first[place]);
+    set(links[1], pairs.second[place], pairs.of_second[place]);
 }
 
 void find_forces(const ModelData& m, const Mode& mode, TreeMode& t) {
@@ -247,12 +256,12 @@ void find_forces(const ModelData& m, const Mode& mode, TreeMode& t) {
     for (int k = 0; k < m.forces; ++k) {
         if (k < m.pairs && mode.key[k]) continue;
         const auto i = static_cast<std::size_t>(k);
-        t.force_slip[t.force_count] = on_groups(m, t, m.force_on[i], t.ratio);
-        t.force_share[t.force_count] = on_groups(m, t, m.force_columns[i], t.force_ratio);
+        set_groups(m, t, m.force_on[i], t.ratio, t.force_count, t.force_slip);
+        set_groups(m, t, m.force_columns[i], t.force_ratio, t.force_count, t.force_share);
         t.force[t.force_count++] = k;
     }
     for (int k = 0; k < m.meshes; ++k)
-        t.turning[k] = on_groups(m, t, m.mesh_loss[static_cast<std::size_t>(k)], t.ratio);
+        set_groups(m, t, m.mesh_loss[static_cast<std::size_t>(k)], t.ratio, k, t.turning);
 }
 
 // Can anything in the mode swing or fade fast enough to matter? Nothing is faster than the bounds of Gershgorin's

@@ -54,7 +54,7 @@ void solve_network(const ModelData& m, const TreeMode& t, double* load, double* 
 }  // namespace
 
 int tree_work_size(const ModelData& m) noexcept {
-    return (11 + matrix_parts) * stride(m) + 5 * m.forces + 4 * m.auxiliary;
+    return (11 + matrix_parts) * stride(m) + 3 * whole_panels(m.forces) + 4 * m.auxiliary;
 }
 
 void place_tree_work(const ModelData& m, TreeWork& work, double* memory) noexcept {
@@ -73,8 +73,7 @@ void place_tree_work(const ModelData& m, TreeWork& work, double* memory) noexcep
         memory += length;
         return at;
     };
-    for (double*& vector : work.effort) vector = take_row(m.forces);
-    work.effort_sum = take_row(m.forces);
+    for (double*& vector : work.stage_effort) vector = take_row(whole_panels(m.forces));
     for (double*& vector : work.auxiliary) vector = take_row(m.auxiliary);
 }
 
@@ -97,11 +96,12 @@ void read_groups(const TreeMode& t, const double* z, GroupState& s) SHIFTRIG_REA
     s.twist[groups] = 0;  // read, and of no consequence
 }
 
-void add_efforts(const TreeMode& t, const double* effort, double* sum) SHIFTRIG_REALTIME {
+void add_efforts(const TreeMode& t, const double* f, double* sum) SHIFTRIG_REALTIME {
+    const GroupPairs& share = t.force_share;
     for (int i = 0; i < t.force_count; ++i) {
-        const GroupSlip& share = t.force_share[i];
-        sum[share.group[0]] -= share.factor[0] * effort[i];
-        sum[share.group[1]] -= share.factor[1] * effort[i];
+        const double effort = f[t.force[i]];
+        sum[share.first[i]] -= share.of_first[i] * effort;
+        sum[share.second[i]] -= share.of_second[i] * effort;
     }
 }
 
@@ -110,9 +110,7 @@ void complete_groups(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTI
     GroupState& groups = s.groups;
     w.model.tree->kernel.shaft_torques(t.paths, groups.speed, groups.twist, groups.rate, groups.passed,
                                        groups.net);
-    double* const effort = w.scratch.tree.effort_sum;
-    for (int i = 0; i < t.force_count; ++i) effort[i] = s.f[t.force[i]];
-    add_efforts(t, effort, groups.net);
+    add_efforts(t, s.f, groups.net);
     groups.mode = &mode;
     groups.modes_built = w.operators.misses;
 }
@@ -127,9 +125,13 @@ const GroupState& groups_of(const Work& w, const Mode& mode, Sample& s) SHIFTRIG
 
 void group_slips(const ModelData& m, const Mode& mode, const double* speed, Sample& s) SHIFTRIG_REALTIME {
     const TreeMode& t = *mode.tree;
-    clear_few(s.slip, s.slip + m.forces);  // what is locked does not slip
-    for (int i = 0; i < t.force_count; ++i) s.slip[t.force[i]] = t.force_slip[i].of(speed);
-    for (int k = 0; k < m.meshes; ++k) s.turning[k] = mode.loss_share[k] == 0 ? 0 : t.turning[k].of(speed);
+    if (t.force_count < m.forces) clear_few(s.slip, s.slip + m.forces);  // what is locked does not slip
+    m.tree->kernel.slips(t.force_slip, speed, t.force, t.force_count, s.slip);
+    for (int k = 0; k < m.meshes; ++k) {
+        s.turning[k] = mode.loss_share[k] == 0 ? 0
+                                               : t.turning.of_first[k] * speed[t.turning.first[k]] +
+                                                     t.turning.of_second[k] * speed[t.turning.second[k]];
+    }
 }
 
 double rigid_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "plant/kernels.h"
+#include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/oil.h"
 #include "plant/laws/sensor.h"
@@ -94,17 +95,38 @@ TEST_P(DeviceLoopsOf, SuspectEveryMarginThatFallsAndRisesAgain) {
     EXPECT_GT(dips, 100);
 }
 
-TEST_P(DeviceLoopsOf, PressAndDragAsTheLawsDo) {
+// Bit for bit, whatever registers do it: a sample may come from a step or be computed anew.
+TEST_P(DeviceLoopsOf, PressSlideAndDragAsTheLawsDo) {
     for (int count = 1; count <= most; ++count) {
-        const std::vector<double> load = positive(count), rest = positive(count), sliding = positive(count);
-        const std::vector<double> slip = numbers(count, 100), factor = positive(count);
-        std::vector<double> holds = numbers(count), slides = numbers(count), f = numbers(count);
-        loops.press(load.data(), rest.data(), sliding.data(), count, holds.data(), slides.data());
-        loops.drag(factor.data(), 60, slip.data(), count, f.data());
+        const std::vector<double> load = positive(count), rest = positive(count), base = positive(count);
+        std::vector<double> slip = numbers(count, 100), inverse_speed = positive(count);
+        const std::vector<double> drag = positive(count);
+        std::vector<double> sense = numbers(count, 1), rise = numbers(count, 0.1);
         for (int k = 0; k < count; ++k) {
-            EXPECT_EQ(holds[at(k)], load[at(k)] * rest[at(k)]);
-            EXPECT_EQ(slides[at(k)], load[at(k)] * sliding[at(k)]);
-            EXPECT_EQ(f[at(k)], drag_torque(factor[at(k)], 1, slip[at(k)], 60));
+            sense[at(k)] = k % 3 - 1;
+            if (k % 4 == 0) rise[at(k)] = 0;
+            if (k % 7 == 1) inverse_speed[at(k)] = 745.1 / std::fabs(slip[at(k)]);  // the smallest numbers there are
+            if (k % 7 == 2) inverse_speed[at(k)] = 1e5;                               // and less
+        }
+        for (const bool fades : {false, true}) {
+            const FrictionTerms terms{load.data(), slip.data(), sense.data(), drag.data(), base.data(), rise.data(),
+                                      inverse_speed.data(), rest.data(), fades, 60, count};
+            std::vector<double> holds = numbers(count), slides = numbers(count), f(at(count) + 1, 7),
+                                stage = f;
+            loops.press(terms, f.data(), holds.data(), slides.data());
+            loops.slide(terms, stage.data());
+            EXPECT_EQ(stage, f);
+            EXPECT_EQ(f[at(count)], 7) << "the next one is another's force";
+            for (int k = 0; k < count; ++k) {
+                FrictionLaw law;
+                law.base = base[at(k)];
+                law.rise = fades ? rise[at(k)] : 0;
+                law.inverse_speed = inverse_speed[at(k)];
+                const double passed = sliding_capacity(law, load[at(k)], slip[at(k)]);
+                EXPECT_EQ(holds[at(k)], load[at(k)] * rest[at(k)]);
+                EXPECT_EQ(slides[at(k)], passed) << k << " of " << count;
+                EXPECT_EQ(f[at(k)], drag_torque(drag[at(k)], 1, slip[at(k)], 60) + sense[at(k)] * passed);
+            }
         }
     }
 }
