@@ -113,7 +113,7 @@ void ledger(benchmark::State& bench, KernelKind kernel) {
     auto* contact = reinterpret_cast<unsigned char*>(block + m.layout.contact);
     detail::Work work{m,   operators, block, block, machine.outputs, scratch, contact, machine.state.time(),
                       1e-3};
-    std::swap(scratch.begin, scratch.end);  // the step left its end where the next one begins
+    std::swap(scratch.first, scratch.last);  // the step left its end where the next one begins
     const detail::Mode& mode = detail::find_mode(m, operators, contact, scratch);
     double fastest = 1e300;
     constexpr int batch = 1000;

@@ -163,7 +163,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     const TreeMode& t = *mode.tree;
     const TreeKernel& kernel = m.tree->kernel;
     TreeWork& v = s.tree;
-    Sample &begin = s.begin, &end = s.end;
+    Sample &begin = s.begin(), &end = s.end();
     const double from = begin.at.fraction, length = end_fraction - from;
     const double h = length * w.h;
     const bool whole = from == 0 && end_fraction == 1;
@@ -227,7 +227,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
 }
 
 void tree_half(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
-    Sample &begin = w.scratch.begin, &half = w.scratch.half, &end = w.scratch.end;
+    Sample &begin = w.scratch.begin(), &half = w.scratch.half, &end = w.scratch.end();
     const double h = end.at.time - begin.at.time;
     tree_sample_rate(w, mode, begin);
     tree_sample_rate(w, mode, end);
@@ -247,15 +247,15 @@ double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
     const TreeMode& t = *mode.tree;
-    const double h = s.end.at.time - s.begin.at.time;
-    const GroupState &begin = s.begin.groups, &end = s.end.groups;  // advance_tree() left them
+    const double h = s.end().at.time - s.begin().at.time;
+    const GroupState &begin = s.begin().groups, &end = s.end().groups;  // advance_tree() left them
     GroupState& groups = s.middle.groups;
     const MiddleSums sums{h,      {begin.speed, end.speed}, {begin.net, end.net}, {begin.rate, end.rate},
                           t.loss, t.drag_loss};
     const double loss = h / 6 * m.tree->kernel.middle(t.paths, sums, groups.speed, groups.rate);
     for (int i = 0; i < m.auxiliary; ++i) {
-        s.middle.auxiliary[i] = 0.5 * (s.begin.auxiliary[i] + s.end.auxiliary[i]) +
-                                h / 8 * (s.begin.auxiliary_rate[i] - s.end.auxiliary_rate[i]);
+        s.middle.auxiliary[i] = 0.5 * (s.begin().auxiliary[i] + s.end().auxiliary[i]) +
+                                h / 8 * (s.begin().auxiliary_rate[i] - s.end().auxiliary_rate[i]);
     }
     group_slips(m, mode, groups.speed, s.middle);
     s.middle.at = s.half.at;

@@ -47,11 +47,13 @@ void tabulate_contact(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         table.drag[k] = state == free_running ? m.pair_laws[i].drag * table.viscosity : 0;
         const FrictionLaw& friction = m.pair_laws[i].friction;
         const bool slides = state != locked, tabled = friction.factor_over_slip != nullptr;
+        // One that runs free has no force: what it would pass is not asked for at every instant.
+        const bool fades = slips(state) || (slides && k >= m.actuated_pairs);
         table.base[k] = tabled ? 0 : slides ? friction.base : m.sliding_at_rest[i];
-        table.rise[k] = tabled || !slides ? 0 : friction.rise;
+        table.rise[k] = tabled || !fades ? 0 : friction.rise;
         table.inverse_speed[k] = friction.inverse_speed;
         table.acts = table.acts || table.sense[k] != 0 || table.drag[k] != 0;
-        table.fades = table.fades || table.rise[k] != 0;
+        table.fades = table.fades || (k < m.actuated_pairs && table.rise[k] != 0);
         table.state_code[k] = state_codes[state];
     }
     for (int k = 0; k < m.meshes; ++k) {

@@ -47,7 +47,7 @@ double turning_margin(const Work& w, int device, const Sample& s) {
 
 SpeedCheck speed_check(const Work& w) {
     const ScratchData& s = w.scratch;
-    return {w.operators.table.sense, s.begin.slip, s.half.slip, s.end.slip, w.model.law_rows};
+    return {w.operators.table.sense, s.begin().slip, s.half.slip, s.end().slip, w.model.law_rows};
 }
 
 // Is a locked pair under more than this share of what it holds? On a tree any pair may be locked, otherwise the
@@ -134,7 +134,7 @@ double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Samp
 
 double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    const Sample &begin = w.scratch.begin, &half = w.scratch.half, &end = w.scratch.end;
+    const Sample &begin = w.scratch.begin(), &half = w.scratch.half, &end = w.scratch.end();
     double first = 1;
     if (mode.tree) return first;
     const bool by_speeds_alone =
@@ -270,7 +270,7 @@ Crossing first_flank(const Work& w, const Sample& begin, const Sample& end) SHIF
 bool hides_contact(const Work& w) SHIFTRIG_REALTIME {
     for (const BacklashLaw& law : w.model.backlashes) {
         if (is_flank_violated(law, flank_margin_half_way(w, law)) &&
-            !is_flank_violated(w, law, w.scratch.end))
+            !is_flank_violated(w, law, w.scratch.end()))
             return true;
     }
     return false;

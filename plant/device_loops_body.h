@@ -94,12 +94,7 @@ inline void slide_pairs(const FrictionTerms& t, double* f, double* holding, doub
         const Lanes passed = load * factor;
         const Lanes capped = slip > most ? most : slip;
         const Lanes drag = read(t.drag + k) * (capped < -most ? -most : capped);
-        const Lanes force = drag + read(t.sense + k) * passed;
-        if (k + lanes <= t.pairs) {
-            write(f + k, force);
-        } else {  // the next ones are others' forces
-            for (int i = 0; k + i < t.pairs; ++i) f[k + i] = force[i];
-        }
+        write(f + k, drag + read(t.sense + k) * passed);
         if (!complete) continue;
         write(sliding + k, passed);
         write(holding + k, load * read(t.static_factor + k));

@@ -15,7 +15,7 @@ namespace shiftrig::plant::detail {
 void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
-    Sample &begin = s.begin, &half = s.half, &late = s.late, &end = s.end;
+    Sample &begin = s.begin(), &half = s.half, &late = s.late, &end = s.end();
     const bool whole = begin.at.fraction == 0 && end_fraction == 1;
     const double h = (end_fraction - begin.at.fraction) * w.h;
     if (whole) {

@@ -24,15 +24,24 @@ void load_sample(const ModelData& m, const double* block, double time, Sample& s
     s.groups.mode = nullptr;
 }
 
+// A few numbers are compared and copied here, many of a long chain by whole registers.
+constexpr int few = 32;
+bool same_state(const ModelData& m, const double* a, const double* b) {
+    return m.states > few ? m.kernel.loops.same(a, b, m.states) : same_bits(a, b, m.states);
+}
+void copy_state(const ModelData& m, const double* from, double* to) {
+    m.states > few ? m.kernel.loops.copy(from, m.states, to) : void(copy_few(from, m.states, to));
+}
+
 // Is the sample that the last step ended with the beginning of this one? Then its forces and torques are
 // what computing them again would give, bit for bit. They come from speeds, twists, auxiliary states, contact states and
 // the engines' modes.
 bool is_carried(const ModelData& m, const OperatorsData& o, const double* block) {
     if (!o.carried || m.depends_on_time) return false;
     const StateLayout& at = m.layout;
-    const Sample& s = o.samples[0];
+    const Sample& s = o.samples[o.first];
     // The step ended with the table up to date.
-    return m.kernel.loops.same(s.z, block + at.speeds, m.states) &&
+    return same_state(m, s.z, block + at.speeds) &&
            same_bits(s.auxiliary, block + at.auxiliary, m.auxiliary) &&
            same_bytes(o.table.contact.data(), block + at.contact, o.table.contact.size()) &&
            same_bits(o.carried_engines.data(), block + at.engines, 3 * static_cast<int>(m.engines.size()));
@@ -163,7 +172,7 @@ double constraint_violation(const Mode& mode, const double* speeds) {
 void report_changes(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
     const double end = w.start + w.h;
-    const Sample& s = w.scratch.begin;
+    const Sample& s = w.scratch.begin();
     // Power that turns round in a mesh, once the mesh is loaded: idle pinions turn to and fro around nothing.
     double* const told = w.next + m.layout.drive_sides;
     const double* const direction = w.operators.table.direction;
@@ -201,15 +210,15 @@ Work begin_step(const ModelData& m, OperatorsData& operators, State& state, Outp
     const double h = m.options.step_size;
     const double time = static_cast<double>(read_integer(block)) * h;
     reset(outputs, scratch, m.forces);
-    scratch.begin = operators.samples[0];
-    scratch.end = operators.samples[1];
+    scratch.first = &operators.samples[operators.first];
+    scratch.last = &operators.samples[1 - operators.first];
     if (is_carried(m, operators, block)) {
-        scratch.begin.at = {time, 0, Side::right};
+        scratch.begin().at = {time, 0, Side::right};
         scratch.stored_before = operators.carried_energy;
     } else {
         operators.carried = false;
-        load_sample(m, block, time, scratch.begin);
-        scratch.stored_before = stored_energy(m, scratch.begin.z, contact);
+        load_sample(m, block, time, scratch.begin());
+        scratch.stored_before = stored_energy(m, scratch.begin().z, contact);
     }
     std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
@@ -223,7 +232,7 @@ Work begin_step(const ModelData& m, OperatorsData& operators, State& state, Outp
 bool is_begun(const Work& w) SHIFTRIG_REALTIME {
     if (!w.operators.carried) return false;
     const ScratchData& scratch = w.scratch;
-    const Sample& s = scratch.begin;
+    const Sample& s = scratch.begin();
     if (scratch.moving_count == 0) return same_bits(scratch.held.data(), s.load, w.model.actuated_pairs);
     for (int k = 0; k < w.model.actuated_pairs; ++k) {
         const auto i = static_cast<std::size_t>(k);
@@ -239,10 +248,10 @@ Work begin_look(const ModelData& m, OperatorsData& operators, const State& state
     const double h = m.options.step_size;
     const double time = static_cast<double>(read_integer(block)) * h;
     reset(outputs, scratch, m.forces);
-    scratch.begin = operators.samples[0];
-    scratch.end = operators.samples[1];
+    scratch.first = &operators.samples[operators.first];
+    scratch.last = &operators.samples[1 - operators.first];
     operators.carried = false;
-    load_sample(m, block, time, scratch.begin);
+    load_sample(m, block, time, scratch.begin());
     std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
         scratch.engine_modes[e] =
@@ -253,8 +262,8 @@ Work begin_look(const ModelData& m, OperatorsData& operators, const State& state
 }
 
 void accept(Work& w) SHIFTRIG_REALTIME {
-    std::swap(w.scratch.begin, w.scratch.end);
-    w.scratch.begin.at.side = Side::right;
+    std::swap(w.scratch.first, w.scratch.last);
+    w.scratch.begin().at.side = Side::right;
 }
 
 void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
@@ -265,35 +274,34 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     Certificate& certificate = w.outputs.certificate;
 
     tabulate_contact(w, mode);
-    advance_sensors(w, s.begin.z);
+    advance_sensors(w, s.begin().z);
     write_integer(block, read_integer(block) + 1);
-    m.kernel.loops.copy(s.begin.z, m.states, block + layout.speeds);  // twists follow the speeds
-    copy_few(s.begin.auxiliary, m.auxiliary, block + layout.auxiliary);
+    copy_state(m, s.begin().z, block + layout.speeds);  // twists follow the speeds
+    copy_few(s.begin().auxiliary, m.auxiliary, block + layout.auxiliary);
     advance_engine_modes(w);
     advance_temperatures(w);
     for (int k = 0; k < m.pairs; ++k) block[layout.heat + k] += s.work[k];
     block[layout.energy] += s.input_work;
     block[layout.energy + 1] += s.dissipated;
 
-    s.stored = stored_energy(m, s.begin.z, w.contact);
+    s.stored = stored_energy(m, s.begin().z, w.contact);
     certificate.energy_defect = s.stored - s.stored_before - s.input_work + s.dissipated;
-    certificate.torque_residual = mode.tree ? s.torque_residual : torque_residual(w, mode, s.begin);
-    certificate.constraint_violation = constraint_violation(mode, s.begin.z);
+    certificate.torque_residual = mode.tree ? s.torque_residual : torque_residual(w, mode, s.begin());
+    certificate.constraint_violation = constraint_violation(mode, s.begin().z);
     certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     if (!std::isfinite(s.stored)) certificate.flags |= 4;  // a sum over every speed and twist
     report_changes(w, mode);
-    fill_outputs(w, mode, s.begin);
+    fill_outputs(w, mode, s.begin());
 
     OperatorsData& o = w.operators;
-    o.samples[0] = s.begin;
-    o.samples[1] = s.end;
+    o.first = static_cast<int>(s.first - o.samples);
     o.carried = s.carries;
     o.carried_energy = s.stored;
     copy_few(block + layout.engines, 3 * static_cast<int>(m.engines.size()), o.carried_engines.data());
 }
 
 void finish_look(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
-    Sample& s = w.scratch.begin;
+    Sample& s = w.scratch.begin();
     tabulate_contact(w, mode);
     w.outputs.certificate.constraint_violation = constraint_violation(mode, s.z);
     w.outputs.certificate.torque_residual =

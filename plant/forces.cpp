@@ -34,13 +34,26 @@ void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcep
     }
 }
 
-// The same for the contact states in force, from their table.
-FrictionTerms friction_terms(const Work& w, const Sample& s) noexcept {
+// The same of pairs that something actuates, for the contact states in force, from their table.
+FrictionTerms friction_terms(const Work& w, const double* load, const Sample& s) noexcept {
     const ModelData& m = w.model;
     const ContactTable& table = w.operators.table;
-    return {s.load,     s.slip,     table.sense,         table.drag,
-            table.base, table.rise, table.inverse_speed, m.static_factor.data(),
-            table.fades, m.drag_speed_limit, m.pairs};
+    return {load,        s.slip,             table.sense,         table.drag,
+            table.base,  table.rise,         table.inverse_speed, m.static_factor.data(),
+            table.fades, m.drag_speed_limit, m.actuated_pairs};
+}
+
+// Of pairs loaded by nature: what loads them is known after the laws.
+void natural_forces(const Work& w, Sample& s) noexcept {
+    const ModelData& m = w.model;
+    const ContactTable& table = w.operators.table;
+    for (int k = m.actuated_pairs; k < m.pairs; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        const double factor = table.rise[k] == 0 ? table.base[k] : sliding_factor(m.pair_laws[i].friction, s.slip[k]);
+        s.holding[k] = s.load[k] * m.static_factor[i];
+        s.sliding[k] = s.load[k] * factor;
+        s.f[k] = table.sense[k] * s.sliding[k];
+    }
 }
 
 // Of pairs whose friction factor is a table.
@@ -133,17 +146,23 @@ namespace {
 
 void load_pairs(const Work& w, Sample& s) noexcept {
     const ScratchData& scratch = w.scratch;
-    w.model.kernel.loops.copy(scratch.held.data(), w.model.pairs, s.load);
+    copy_few(scratch.held.data(), w.model.pairs, s.load);
     for (int i = 0; i < scratch.moving_count; ++i) {
         const int k = scratch.moving[static_cast<std::size_t>(i)];
         s.load[k] = pair_load(w, k, s.at);
     }
 }
 
-// Those alone to which the laws below add.
-void load_by_nature(const Work& w, Sample& s) noexcept {
+// The same for a stage, where nobody looks at the loads afterwards: where those of actuated pairs stand.
+const double* stage_loads(const Work& w, Sample& s) noexcept {
+    const ModelData& m = w.model;
     const double* const held = w.scratch.held.data();
-    for (int k = w.model.actuated_pairs; k < w.model.pairs; ++k) s.load[k] = held[k];
+    if (w.scratch.moving_count > 0 || !m.tabled_pairs.empty() || !m.one_way_pairs.empty()) {
+        load_pairs(w, s);
+        return s.load;
+    }
+    for (int k = m.actuated_pairs; k < m.pairs; ++k) s.load[k] = held[k];
+    return held;
 }
 
 // Torques that no contact state concerns, rates of the auxiliary states, and what the laws press together, added to
@@ -236,13 +255,12 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHI
 void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const bool acts = w.operators.table.acts;
-    acts ? load_pairs(w, s) : load_by_nature(w, s);
-    clear_few(acts ? s.f + m.pairs : s.f, s.f + m.forces);
+    const double* const load = stage_loads(w, s);
+    if (acts) m.kernel.loops.slide(friction_terms(w, load, s), s.f);
+    clear_few(acts ? s.f + m.actuated_pairs : s.f, s.f + m.forces);  // the loop went beyond
+    tabled_forces(w, s, false);
     law_forces(w, s);
-    if (acts) {
-        m.kernel.loops.slide(friction_terms(w, s), s.f);
-        tabled_forces(w, s, false);
-    }
+    natural_forces(w, s);
     weak_forces(w, w.contact, s);
     flank_forces(w, w.contact, s);
     bearing_forces(w, w.contact, s);
@@ -251,10 +269,18 @@ void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
 void end_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     load_pairs(w, s);
-    clear_few(s.f + m.pairs, s.f + m.forces);
-    law_forces(w, s);
-    m.kernel.loops.press(friction_terms(w, s), s.f, s.holding, s.sliding);
+    const double* const load = w.scratch.moving_count > 0 ? s.load : w.scratch.held.data();
+    m.kernel.loops.press(friction_terms(w, load, s), s.f, s.holding, s.sliding);
+    clear_few(s.f + m.actuated_pairs, s.f + m.forces);
     tabled_forces(w, s, true);
+    for (int i = 0; i < w.scratch.moving_count; ++i) {  // one that is about to engage shows what it would pass
+        const int k = w.scratch.moving[static_cast<std::size_t>(i)];
+        if (w.contact[k] != free_running || s.load[k] == 0) continue;
+        s.sliding[k] =
+            sliding_capacity(m.pair_laws[static_cast<std::size_t>(k)].friction, s.load[k], s.slip[k]);
+    }
+    law_forces(w, s);
+    natural_forces(w, s);
     weak_forces(w, w.contact, s);
     flank_forces(w, w.contact, s);
     bearing_forces(w, w.contact, s);

@@ -68,8 +68,8 @@ void fill_middle(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
     double* const change = s.vector_b;
-    m.kernel.loops.subtract(s.half.f, s.begin.f, m.forces, change);
-    m.kernel.loops.subtract(s.late.f, s.begin.f, m.forces, change + m.forces);
+    m.kernel.loops.subtract(s.half.f, s.begin().f, m.forces, change);
+    m.kernel.loops.subtract(s.late.f, s.begin().f, m.forces, change + m.forces);
     Sample& middle = s.middle;
     double* const q = middle.f - mode.order;
     m.kernel.multiply(s.used.middle, padded(mode.order), 2 * m.forces, change, s.half.f - mode.order, q);
@@ -83,7 +83,7 @@ void fill_middle(Work& w, const Mode& mode) {
 void forces_at(const ScratchData& scratch, int count, double s, double* f) {
     const double w0 = (1 - s) * (1 - 2 * s), w1 = 4 * s * (1 - s), w2 = s * (2 * s - 1);
     for (int k = 0; k < count; ++k)
-        f[k] = w0 * scratch.begin.f[k] + w1 * scratch.half.f[k] + w2 * scratch.late.f[k];
+        f[k] = w0 * scratch.begin().f[k] + w1 * scratch.half.f[k] + w2 * scratch.late.f[k];
 }
 
 // An even number, at least the two of Simpson's rule.
@@ -96,7 +96,7 @@ int ledger_parts(const Mode& mode, double fraction) {
 void book_finely(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
-    const double h = s.end.at.time - s.begin.at.time;
+    const double h = s.end().at.time - s.begin().at.time;
     StepOperators op = mode.ledger;
     int parts = mode.ledger_parts;
     if (s.used.length != mode.step.length) {
@@ -108,7 +108,7 @@ void book_finely(Work& w, const Mode& mode) {
     double* const at_half = s.vector_a;  // the three blocks of `advance`, of which the last is the end
     double* const at_end = at_half + 2 * block;
     double* const forces = s.vector_c;
-    for (int i = 0; i < n; ++i) at_end[i] = s.begin.z[mode.coordinates[i]];
+    for (int i = 0; i < n; ++i) at_end[i] = s.begin().z[mode.coordinates[i]];
     double external_work = 0;
     for (int part = 0;; ++part) {
         std::copy(at_end, at_end + n, at.f - n);
@@ -142,7 +142,7 @@ void book_finely(Work& w, const Mode& mode) {
         m.kernel.multiply(op.from_late, block, m.forces, forces, at_end, at_end);
     }
     const double field =
-        h / 6 * (field_losses(m, s.begin, s.begin.slip) + field_losses(m, s.late, s.end.slip));
+        h / 6 * (field_losses(m, s.begin(), s.begin().slip) + field_losses(m, s.late, s.end().slip));
     s.dissipated += field;
     s.input_work += external_work + field;
 }
@@ -163,7 +163,7 @@ double stored_energy(const ModelData& m, const double* z, const unsigned char* c
 void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
-    const Sample &begin = s.begin, &middle = s.middle, &end = s.end;
+    const Sample &begin = s.begin(), &middle = s.middle, &end = s.end();
     const double h = end.at.time - begin.at.time;
     if (!mode.tree && mode.ledger_parts > 1 && ledger_parts(mode, h / w.h) > 2) return book_finely(w, mode);
 

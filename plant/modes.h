@@ -146,9 +146,10 @@ struct OperatorsData {
     ContactTable table;
     bool inputs_known = false;
     // The samples a step begins and ends with. The end of one is the beginning of the next: carried over where
-    // State and inputs prove to be those it was computed from.
+    // State and inputs prove to be those it was computed from. `first` is the one to begin with.
     AlignedDoubles sample_memory;
     Sample samples[2];
+    int first = 0;
     bool carried = false;
     std::vector<double> carried_engines;  // of the State block
     double carried_energy = 0;            // stored in it [J]

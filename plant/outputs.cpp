@@ -23,8 +23,7 @@ void fill_outputs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const auto put = [&next](auto... values) { ((*next++ = values), ...); };
 
     if (mode.tree) tree_swings(w, mode, s);
-    m.kernel.loops.copy(s.z, m.masses, next);
-    next += m.masses;
+    next = copy_few(s.z, m.masses, next);
     const Shown at{w, mode, s};
     const auto show_all = [&](const auto& devices) {
         if (!devices.empty()) next = show(at, devices, next);

@@ -23,8 +23,8 @@ double largest_torque(const ModelData& m, const Sample& s) {
 
 bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    const Sample &begin = w.scratch.begin, &half = w.scratch.half, &late = w.scratch.late,
-                 &end = w.scratch.end;
+    const Sample &begin = w.scratch.begin(), &half = w.scratch.half, &late = w.scratch.late,
+                 &end = w.scratch.end();
     const double size = std::max(largest_torque(m, begin), largest_torque(m, end));
     // The last stage stands on an extrapolation: what it takes the forces to be, and what they are.
     double wrong = 0;
@@ -67,7 +67,7 @@ double first_knot(const Work& w) SHIFTRIG_REALTIME {
     double first = 1;
     for (const int k : w.model.tabled_pairs) {
         if (!slips(w.contact[k])) continue;
-        const double s0 = std::fabs(w.scratch.begin.slip[k]), s1 = std::fabs(w.scratch.end.slip[k]);
+        const double s0 = std::fabs(w.scratch.begin().slip[k]), s1 = std::fabs(w.scratch.end().slip[k]);
         // The engine for long chains has no stage half way.
         const double sm = w.model.tree ? 0.5 * (s0 + s1) : std::fabs(w.scratch.half.slip[k]);
         for (const auto& [knot, factor] :

@@ -57,7 +57,7 @@ ScratchData::ScratchData(const ModelData& m) {
     for (std::size_t i = 0; i < std::size(samples); ++i)
         place_sample(m, *samples[i], buffer.data()->value + i * size);
     loads.resize(static_cast<std::size_t>(m.pairs));
-    held.assign(static_cast<std::size_t>(m.pairs), 0.);
+    held.assign(static_cast<std::size_t>(m.pairs) + loop_slack, 0.);
     for (auto* list : {&moving, &busy}) list->assign(static_cast<std::size_t>(m.pairs), 0);
     moves.assign(static_cast<std::size_t>(m.pairs), 0);
     engine_modes.resize(m.engines.size());

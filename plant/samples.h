@@ -75,7 +75,11 @@ struct Mode;
 struct ScratchData {
     explicit ScratchData(const ModelData& model);
     AlignedDoubles buffer;
-    Sample begin, end;  // live with the operators
+    Sample *first = nullptr, *last = nullptr;  // of the part under way; they live with the operators
+    Sample& begin() noexcept { return *first; }
+    Sample& end() noexcept { return *last; }
+    const Sample& begin() const noexcept { return *first; }
+    const Sample& end() const noexcept { return *last; }
     Sample half, late, middle;
     std::vector<PairLoad> loads;
     std::vector<double> held;          // per pair: its load where that does not change within the step [Nm]

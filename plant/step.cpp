@@ -51,7 +51,7 @@ Mode& begin_mode(Work& w) SHIFTRIG_REALTIME {
     ScratchData& s = w.scratch;
     const bool begun = is_begun(w);
     const bool settled = begun && s.moving_count == 0;
-    Mode& mode = settled ? find_mode(w.model, w.operators, w.contact, s) : settle(w, s.begin, begun);
+    Mode& mode = settled ? find_mode(w.model, w.operators, w.contact, s) : settle(w, s.begin(), begun);
     // What it takes to find nothing to do is not counted: it depends on whether the last step is remembered.
     if (std::equal(w.contact, w.contact + w.model.contact_bytes, s.before.begin()))
         w.outputs.certificate.mode_lookups = 1;
@@ -79,12 +79,12 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
     const double beyond = by_itself ? 3e-3 : overrun ? 3e-4 : 0;
     double low = done, high = until;
     const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
-    double at_low = left(w.scratch.begin), at_high = left(w.scratch.end);
+    double at_low = left(w.scratch.begin()), at_high = left(w.scratch.end());
     const double size = std::fabs(at_low) + std::fabs(at_high);
     double reached = done + std::min(crossing.theta + beyond, 1.) * (until - done);
     for (int steps = 1;; ++steps) {
         integrate(w, mode, reached);
-        const double rest = left(w.scratch.end);
+        const double rest = left(w.scratch.end());
         if (std::fabs(rest) <= close_enough * size || steps == most_steps) return reached;
         (rest > 0 ? low : high) = reached;
         (rest > 0 ? at_low : at_high) = rest;
@@ -100,9 +100,9 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
 double approach_flank(Work& w, const Mode& mode, const Crossing& crossing, double done,
                       double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 12;
-    Sample& end = w.scratch.end;
+    Sample& end = w.scratch.end();
     const Flank flank = violated_flank(w, backlash_of(w, crossing.device), end);
-    const double size = margin_of(w, flank, w.scratch.begin) - margin_of(w, flank, end);
+    const double size = margin_of(w, flank, w.scratch.begin()) - margin_of(w, flank, end);
     const double close_enough = std::max(1e-9 * size, flank_rounding(flank.law));
     double low = done, high = until;
     double reached = std::min(until, done + std::max(crossing.theta * (until - done), instant));
@@ -125,7 +125,7 @@ double approach_flank(Work& w, const Mode& mode, const Crossing& crossing, doubl
 bool changes_at_once(const Work& w, const Crossing& crossing, double length) SHIFTRIG_REALTIME {
     if (acts_by_itself(crossing.change) || crossing.theta * length >= instant) return false;
     return crossing.change != Change::flank || length <= 2 * instant ||
-           flank_margin(w, backlash_of(w, crossing.device), w.scratch.begin) <= 0;
+           flank_margin(w, backlash_of(w, crossing.device), w.scratch.begin()) <= 0;
 }
 
 double approach_any(Work& w, const Mode& mode, const Crossing& crossing, double done,
@@ -175,7 +175,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         }
 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
-        Crossing first = first_crossing(w, *mode, s.begin, s.end);
+        Crossing first = first_crossing(w, *mode, s.begin(), s.end());
         const bool inside =
             first.device >= 0 && localise && outputs.certificate.events * length < m.maximum_events;
         double reached = until;
@@ -186,9 +186,9 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
             // An estimate that came too late passed over another change, which goes first; of flanks also what approach()
             // goes beyond the crossing, since the power of a mesh often turns in the instant that lets one go.
             for (int passed = 0; passed < 2; ++passed) {
-                Crossing earlier = first_crossing(w, *mode, s.begin, s.end);
+                Crossing earlier = first_crossing(w, *mode, s.begin(), s.end());
                 if (earlier.device == first.device || earlier.theta > 0.999)
-                    earlier = first_flank(w, s.begin, s.end);
+                    earlier = first_flank(w, s.begin(), s.end());
                 if (earlier.device < 0 || earlier.device == first.device) break;
                 first = earlier;
                 reached = approach_any(w, *mode, first, done, reached);
@@ -207,14 +207,14 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         // The new state acts from here on; where events are used up, or by choice, from the next step on.
         if (inside) {
             const bool moves = acts_by_itself(first.change) ? first.change != Change::limit
-                                                            : change_state(w, first.device, s.begin);
+                                                            : change_state(w, first.device, s.begin());
             if (moves || --leans < 0) ++outputs.certificate.events;
         } else if (first.device >= 0 && first.change != Change::turn && first.change != Change::limit) {
-            if (!acts_by_itself(first.change)) change_all(w, *mode, s.begin);
+            if (!acts_by_itself(first.change)) change_all(w, *mode, s.begin());
             outputs.certificate.fall_backs += localise;
         }
         if (done < 1 || first.device >= 0) {
-            mode = &settle(w, s.begin);
+            mode = &settle(w, s.begin());
             s.carries = false;
         }
     }
@@ -226,7 +226,7 @@ void observe(const Model& model, Operators& operators, const State& state, const
     Work w = begin_look(model.data(), operators.data(), state, outputs, scratch.data());
     latch_inputs(w, inputs);
     hold_actuation(w);
-    const Mode& mode = settle(w, w.scratch.begin);
+    const Mode& mode = settle(w, w.scratch.begin());
     finish_look(w, mode);
 }
 

@@ -82,8 +82,8 @@ double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
 Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
     if (!w.scratch.turned) return mode;
     const ModelData& m = w.model;
-    const Sample& begin = w.scratch.begin;
-    Sample& end = w.scratch.end;
+    const Sample& begin = w.scratch.begin();
+    Sample& end = w.scratch.end();
     const double h = end.at.time - begin.at.time;
     double* change = w.scratch.vector_c;  // of the speeds: first as if every mass were free
     double longest = 0;

@@ -181,7 +181,7 @@ void tree_internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_
     read_groups(*mode.tree, s.z, s.groups);
     complete_groups(w, mode, s);
     const double residual = rigid_torques(w, mode, s);
-    if (&s == &scratch.begin || &s == &scratch.end) scratch.torque_residual = residual;
+    if (&s == &scratch.begin() || &s == &scratch.end()) scratch.torque_residual = residual;
 }
 
 void tree_slips(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
