@@ -122,19 +122,14 @@ StageSums stage_sums(const Impulse& impulse, const double (&ways)[stages], int c
     return sums;
 }
 
-// What the forces of so many stages give to the groups: Σ h share_j Q_j goes to `give`, by group.
-template <typename Give>
-void give_efforts(const TreeMode& t, const double (&shares)[stages], int count, const TreeWork& v, double h,
-                  const Give& give) {
-    const GroupPairs& share = t.force_share;
-    for (int i = 0; i < t.force_count; ++i) {
-        const int k = t.force[i];
-        double effort = shares[0] * v.effort[0][k];
-        for (int j = 1; j < count; ++j) effort += shares[j] * v.effort[j][k];
-        effort *= -h;
-        give(share.first[i], share.of_first[i] * effort);
-        give(share.second[i], share.of_second[i] * effort);
+// What the forces of so many stages take from the groups: −h Σ share_j Q_j.
+Efforts efforts(const TreeMode& t, const double (&shares)[stages], int count, const TreeWork& v, double h) {
+    Efforts all{t.force_share, t.force, t.force_count, count, {}, {}};
+    for (int j = 0; j < count; ++j) {
+        all.effort[j] = v.effort[j];
+        all.weight[j] = -h * shares[j];
     }
+    return all;
 }
 
 // Where shafts swing, makes the linear part of the step one of order 4. hL/(1 − hγL)² in place of hL: the same to that
@@ -148,8 +143,7 @@ void complete_swing(const ModelData& m, const TreeMode& t, const TreeWork& v, do
     const Swing swing = kernel.swing_error(t.paths, sums, v.way, error);
     if (!(swing.error > ark3_swing_tolerance * h * std::max(swing.fastest, at_rest))) return;
     kernel.combine(t.paths, sums, v.momentum, v.way);
-    give_efforts(t, swing_impulse.effort, stages, v, h,
-                 [&](int g, double impulse) { v.momentum[g] += impulse; });
+    kernel.give(efforts(t, swing_impulse.effort, stages, v, h), nullptr, v.momentum);
     constexpr double factor = -excess / embedded / gamma;
     kernel.correct(t.paths, stage, v.momentum, error, factor, {v.swing[1], v.swing[2], v.swing[3]}, end.speed,
                    end.twist);
@@ -181,8 +175,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     for (int i = 1; i < stages; ++i) {
         kernel.combine(t.paths, stage_sums(impulses.star[i], implicit_table[i], i, start, v, h), v.momentum,
                        v.way);
-        give_efforts(t, impulses.star[i].effort, i, v, h,
-                     [&](int g, double impulse) { v.momentum[g] += impulse; });
+        kernel.give(efforts(t, impulses.star[i].effort, i, v, h), nullptr, v.momentum);
         double* const speed = v.speed[i - 1];
         kernel.solve(t.paths, matrix, v.momentum, {start.twist, v.way}, speed);
 
@@ -206,8 +199,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
                   groups.twist);
     double lacks[stages];
     for (int j = 0; j < stages; ++j) lacks[j] = weights[j] - explicit_table[stages - 1][j];
-    give_efforts(t, lacks, stages, v, h,
-                 [&](int g, double impulse) { groups.speed[g] += impulse * t.inverse_mass[g]; });
+    kernel.give(efforts(t, lacks, stages, v, h), t.inverse_mass, groups.speed);
     if (t.swings) complete_swing(m, t, v, h, matrix, start, groups);
     for (int a = 0; a < m.auxiliary; ++a) {
         double change = 0;

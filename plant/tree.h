@@ -217,8 +217,6 @@ const GroupState& groups_of(const Work& work, const Mode& mode, Sample& sample) 
 // Slips of forces and meshes from q.
 void group_slips(const ModelData& model, const Mode& mode, const double* speed,
                  Sample& sample) SHIFTRIG_REALTIME;
-// Adds what forces give to the groups.
-void add_efforts(const TreeMode& tree, const double* f, double* sum) SHIFTRIG_REALTIME;
 
 // Internal torques of the sample from its groups; returns their residual relative to the largest torque.
 double rigid_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;

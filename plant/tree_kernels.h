@@ -102,9 +102,20 @@ struct GroupPairs {
     int *first = nullptr, *second = nullptr;
     double *of_first = nullptr, *of_second = nullptr;
 };
-// values[place[i]] = of_first · that of the first group + of_second · that of the second
+// Places rise. values[place[i]] = of_first · that of the first group + of_second · that of the second
 using Slips = void (*)(const GroupPairs&, const double* of_group, const int* place, int count,
                        double* values) SHIFTRIG_REALTIME;
+
+// Adds Σ_j weight_j effort_j[place[i]], times its share, to the sums of one or two groups; with a scale by group, times that.
+struct Efforts {
+    GroupPairs share;
+    const int* place = nullptr;  // rising
+    int count = 0;
+    int terms = 0;
+    const double* effort[4] = {};
+    double weight[4] = {};
+};
+using Give = void (*)(const Efforts&, const double* scale, double* sum) SHIFTRIG_REALTIME;
 
 // values[i] = ratio[i] · of_group[group[i]]
 using Spread = void (*)(const int* group, const double* ratio, const double* of_group, int count,
@@ -119,6 +130,7 @@ struct TreeKernel {
     SwingError swing_error = nullptr;
     Correct correct = nullptr;
     Slips slips = nullptr;
+    Give give = nullptr;
     Spread spread = nullptr;
 };
 

@@ -24,6 +24,10 @@ inline void write(double* p, const Block& v) noexcept {
     __builtin_memcpy(p, &v, sizeof v);
 }
 
+inline Block all(double value) noexcept {
+    return Block{value, value, value, value};
+}
+
 // Along the tree's edges; 0 at roots.
 inline void differences(const TreePaths& t, const double* __restrict way, double* __restrict difference) noexcept {
     const int groups = t.groups;
@@ -128,7 +132,7 @@ inline void eliminate(const TreePaths& t, const StageMatrix& m, double* __restri
             b = SHIFTRIG_BLOCK_FMA(read(scan.by_one + at), from_above(b), b);
             b = SHIFTRIG_BLOCK_FMA(read(scan.by_two + at), by_two(b), b);
             const Block outside = read(scan.from_outside + at);
-            write(right + at, SHIFTRIG_BLOCK_FMA(outside, Block{} + below, b));
+            write(right + at, SHIFTRIG_BLOCK_FMA(outside, all(below), b));
             below = SHIFTRIG_FMA(outside[0], below, b[0]);
         }
         for (; g > begin; --g) {
@@ -160,7 +164,7 @@ inline void substitute(const TreePaths& t, const StageMatrix& m, double* __restr
             q = SHIFTRIG_BLOCK_FMA(read(scan.by_one + g), from_below(q), q);
             q = SHIFTRIG_BLOCK_FMA(read(scan.by_two + g), by_two(q), q);
             const Block outside = read(scan.from_outside + g);
-            write(speed + g, SHIFTRIG_BLOCK_FMA(outside, Block{} + above, q));
+            write(speed + g, SHIFTRIG_BLOCK_FMA(outside, all(above), q));
             above = SHIFTRIG_FMA(outside[lanes - 1], above, q[lanes - 1]);
         }
         for (; g < end; ++g) above = speed[g] = SHIFTRIG_FMA(lower[g], above, inverse[g] * speed[g]);
@@ -176,9 +180,19 @@ void solve(const TreePaths& t, const StageMatrix& stage, const double* momentum,
     const auto link = [=](int g, double difference) {
         return weight * stiffness[g] * SHIFTRIG_FMA(share, difference, psi[g]);
     };
-    const int groups = t.groups;
-    for (int g = 0; g < groups; ++g)
-        right[g] = p[g] + (link(g + 1, way[g + 1] - way[g]) - link(g, way[g] - way[g - 1]));
+    // Links of a block at a time: those of the next one are needed for the last group of this one.
+    const auto links = [=](int g) {
+        const Block twisted =
+            SHIFTRIG_BLOCK_FMA(all(share), read(way + g) - read(way + g - 1), read(psi + g));
+        return all(weight) * read(stiffness + g) * twisted;
+    };
+    Block here = links(0);
+    for (int g = 0; g < t.groups; g += lanes) {
+        const Block next = links(g + lanes);
+        const Block below = __builtin_shuffle(here, next, Lanes{1, 2, 3, 4});
+        write(right + g, read(p + g) + (below - here));
+        here = next;
+    }
     for (int i = 0; i < t.hanging; ++i) {
         const int g = t.head[i], up = t.up[g];
         const double taken = link(g, way[g] - way[g - 1]), passed = link(g, way[g] - way[up]);
@@ -317,6 +331,36 @@ void slips(const GroupPairs& pairs, const double* of_group, const int* place, in
     }
 }
 
+template <bool scaled>
+inline void give_efforts(const Efforts& e, const double* scale, double* sum) noexcept {
+    const auto give = [=](int g, double impulse) { sum[g] += scaled ? impulse * scale[g] : impulse; };
+    int i = 0;
+    for (; i + lanes <= e.count; i += lanes) {
+        const int* const place = e.place + i;
+        const bool side_by_side = place[lanes - 1] - place[0] == lanes - 1;
+        Block effort = {};
+        for (int j = 0; j < e.terms; ++j) {
+            const Block term = side_by_side ? read(e.effort[j] + place[0]) : gather(e.effort[j], place);
+            effort = SHIFTRIG_BLOCK_FMA(all(e.weight[j]), term, effort);
+        }
+        const Block first = read(e.share.of_first + i) * effort, second = read(e.share.of_second + i) * effort;
+        for (int j = 0; j < lanes; ++j) {
+            give(e.share.first[i + j], first[j]);
+            give(e.share.second[i + j], second[j]);
+        }
+    }
+    for (; i < e.count; ++i) {
+        double effort = 0;
+        for (int j = 0; j < e.terms; ++j) effort = SHIFTRIG_FMA(e.weight[j], e.effort[j][e.place[i]], effort);
+        give(e.share.first[i], e.share.of_first[i] * effort);
+        give(e.share.second[i], e.share.of_second[i] * effort);
+    }
+}
+
+void give(const Efforts& e, const double* scale, double* sum) SHIFTRIG_REALTIME {
+    scale ? give_efforts<true>(e, scale, sum) : give_efforts<false>(e, scale, sum);
+}
+
 void spread(const int* group, const double* ratio, const double* of_group, int count,
             double* values) SHIFTRIG_REALTIME {
     int i = 0;
@@ -326,7 +370,7 @@ void spread(const int* group, const double* ratio, const double* of_group, int c
     for (; i < count; ++i) values[i] = ratio[i] * of_group[group[i]];
 }
 
-constexpr TreeKernel kernel{shaft_torques, combine, solve, finish, middle, swing_error, correct, slips, spread};
+constexpr TreeKernel kernel{shaft_torques, combine, solve, finish, middle, swing_error, correct, slips, give, spread};
 
 }  // namespace
 }  // namespace shiftrig::plant::detail

@@ -96,21 +96,13 @@ void read_groups(const TreeMode& t, const double* z, GroupState& s) SHIFTRIG_REA
     s.twist[groups] = 0;  // read, and of no consequence
 }
 
-void add_efforts(const TreeMode& t, const double* f, double* sum) SHIFTRIG_REALTIME {
-    const GroupPairs& share = t.force_share;
-    for (int i = 0; i < t.force_count; ++i) {
-        const double effort = f[t.force[i]];
-        sum[share.first[i]] -= share.of_first[i] * effort;
-        sum[share.second[i]] -= share.of_second[i] * effort;
-    }
-}
-
 void complete_groups(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const TreeMode& t = *mode.tree;
     GroupState& groups = s.groups;
-    w.model.tree->kernel.shaft_torques(t.paths, groups.speed, groups.twist, groups.rate, groups.passed,
+    const TreeKernel& kernel = w.model.tree->kernel;
+    kernel.shaft_torques(t.paths, groups.speed, groups.twist, groups.rate, groups.passed,
                                        groups.net);
-    add_efforts(t, s.f, groups.net);
+    kernel.give({t.force_share, t.force, t.force_count, 1, {s.f}, {-1}}, nullptr, groups.net);
     groups.mode = &mode;
     groups.modes_built = w.operators.misses;
 }
