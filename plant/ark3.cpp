@@ -139,14 +139,13 @@ void complete_swing(const ModelData& m, const TreeMode& t, const TreeWork& v, do
                     const StageMatrix& stage, const GroupState& begin, GroupState& end) {
     const TreeKernel& kernel = m.tree->kernel;
     const StageSums sums = stage_sums(swing_impulse, embedded_error, stages, begin, v, h);
-    double* const error = v.swing[0];
-    const Swing swing = kernel.swing_error(t.paths, sums, v.way, error);
+    const Swing swing = kernel.swing_error(t.paths, sums, v.way);
     if (!(swing.error > ark3_swing_tolerance * h * std::max(swing.fastest, at_rest))) return;
     kernel.combine(t.paths, sums, v.momentum, v.way);
     kernel.give(efforts(t, swing_impulse.effort, stages, v, h), nullptr, v.momentum);
     constexpr double factor = -excess / embedded / gamma;
-    kernel.correct(t.paths, stage, v.momentum, error, factor, {v.swing[1], v.swing[2], v.swing[3]}, end.speed,
-                   end.twist);
+    kernel.correct(t.paths, stage, v.momentum, v.way, factor, {v.swing[0], v.swing[1], v.swing[2], v.swing[3]},
+                   end.speed, end.twist);
 }
 
 }  // namespace
@@ -244,7 +243,7 @@ double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     GroupState& groups = s.middle.groups;
     const MiddleSums sums{h,      {begin.speed, end.speed}, {begin.net, end.net}, {begin.rate, end.rate},
                           t.loss, t.drag_loss};
-    const double loss = h / 6 * m.tree->kernel.middle(t.paths, sums, groups.speed, groups.rate);
+    const double loss = h / 6 * m.tree->kernel.middle(t.paths, sums, groups.speed);
     for (int i = 0; i < m.auxiliary; ++i) {
         s.middle.auxiliary[i] = 0.5 * (s.begin().auxiliary[i] + s.end().auxiliary[i]) +
                                 h / 8 * (s.begin().auxiliary_rate[i] - s.end().auxiliary_rate[i]);

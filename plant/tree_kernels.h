@@ -79,22 +79,21 @@ struct MiddleSums {
     const double *speed[2], *net[2], *rate[2];  // at the beginning and the end
     const double *loss = nullptr, *drag_loss = nullptr;
 };
-using Middle = double (*)(const TreePaths&, const MiddleSums&, double* speed, double* rate) SHIFTRIG_REALTIME;
+using Middle = double (*)(const TreePaths&, const MiddleSums&, double* speed) SHIFTRIG_REALTIME;
 
-// The largest difference e of a twist from that of the embedded method [rad], and the largest speed [rad/s].
+// The largest difference e of a twist with stiffness from that of the embedded method [rad], and the largest speed [rad/s].
 struct Swing {
     double error = 0, fastest = 0;
 };
-// With e as the differences of Σ of_way_j q_j, left in `twist`.
-using SwingError = Swing (*)(const TreePaths&, const StageSums&, double* way,
-                             double* twist) SHIFTRIG_REALTIME;
+// e as the differences of Σ of_way_j q_j, left in `way`; the last speed is that of the end.
+using SwingError = Swing (*)(const TreePaths&, const StageSums&, double* way) SHIFTRIG_REALTIME;
 
-// Adds factor (S² − S) e to speeds and twists, e = (momentum; error): S = (1 − hγL)⁻¹ of the linear part L is what a stage
-// solves with. Leaves nothing of `momentum`.
+// Adds factor (S² − S) e to speeds and twists, e = (momentum; differences of `way`): S = (1 − hγL)⁻¹ of the linear part L is
+// what a stage solves with. Leaves nothing of `momentum`.
 struct SwingWork {
-    double *first, *second, *rate;
+    double *error, *first, *second, *rate;
 };
-using Correct = void (*)(const TreePaths&, const StageMatrix&, double* momentum, const double* error,
+using Correct = void (*)(const TreePaths&, const StageMatrix&, double* momentum, const double* way,
                          double factor, const SwingWork&, double* speed, double* twist) SHIFTRIG_REALTIME;
 
 // What belongs to one or two groups each: the factor is 0 where there is only one.

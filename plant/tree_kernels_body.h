@@ -28,37 +28,78 @@ inline Block all(double value) noexcept {
     return Block{value, value, value, value};
 }
 
-// Along the tree's edges; 0 at roots.
-inline void differences(const TreePaths& t, const double* __restrict way, double* __restrict difference) noexcept {
-    const int groups = t.groups;
-    for (int g = 0; g < groups; ++g) difference[g] = way[g] - way[g - 1];
-    for (int p = 0; p < t.count; ++p) {
-        const int head = t.begin[p];
-        difference[head] = t.parent[p] < 0 ? 0 : way[head] - way[t.parent[p]];
+// The last numbers of one block and all but the last of the next: each group's parent inside a path.
+inline Block one_before(const Block& last, const Block& here) noexcept {
+    return __builtin_shuffle(last, here, Lanes{3, 4, 5, 6});
+}
+inline Block one_behind(const Block& here, const Block& next) noexcept {
+    return __builtin_shuffle(here, next, Lanes{1, 2, 3, 4});
+}
+
+// 0 from this group on.
+inline Block up_to(int groups, int g, const Block& v) noexcept {
+    const Lanes place = Lanes{0, 1, 2, 3} + g;
+    return reinterpret_cast<Block>(reinterpret_cast<Lanes>(v) & (place < groups));
+}
+
+// Of value(g), in blocks: use(g, value, difference to the group before). At heads of paths that is nobody's business;
+// at_head(g, parent) puts right what came of it.
+template <typename Value, typename Use, typename AtHead>
+inline void along_paths(const TreePaths& t, const Value& value, const Use& use, const AtHead& at_head) noexcept {
+    Block last = {};
+    for (int g = 0, groups = t.groups; g < groups; g += lanes) {
+        const Block here = value(g);
+        use(g, here, here - one_before(last, here));
+        last = here;
     }
+    for (int i = 0; i < t.hanging; ++i) at_head(t.head[i], t.up[t.head[i]]);
+}
+
+inline void set_at_roots(const TreePaths& t, double* values) noexcept {
+    for (int p = 0; p < t.count; ++p) {
+        if (t.parent[p] < 0) values[t.begin[p]] = 0;
+    }
+}
+
+// Along the tree's edges; 0 at roots.
+inline void differences(const TreePaths& t, const double* way, double* difference) noexcept {
+    along_paths(
+        t, [=](int g) { return read(way + g); },
+        [=](int g, const Block&, const Block& change) { write(difference + g, change); },
+        [=](int head, int parent) { difference[head] = way[head] - way[parent]; });
+    set_at_roots(t, difference);
 }
 
 void shaft_torques(const TreePaths& t, const double* speed, const double* twist, double* rate, double* passed,
                    double* torque) SHIFTRIG_REALTIME {
-    const double* __restrict q = speed;
-    const double* __restrict psi = twist;
-    double* __restrict through = passed;
-    double* __restrict sum = torque;
-    differences(t, speed, rate);
-    const double* __restrict delta = rate;
-    const double *stiffness = t.stiffness, *damping = t.damping, *drag = t.drag;
+    const double *stiffness = t.stiffness, *damping = t.damping;
+    along_paths(
+        t, [=](int g) { return read(speed + g); },
+        [=](int g, const Block&, const Block& change) {
+            write(rate + g, change);
+            write(passed + g, SHIFTRIG_BLOCK_FMA(read(stiffness + g), read(twist + g), read(damping + g) * change));
+        },
+        [=](int head, int parent) {
+            rate[head] = speed[head] - speed[parent];
+            passed[head] = SHIFTRIG_FMA(stiffness[head], twist[head], damping[head] * rate[head]);
+        });
+    set_at_roots(t, rate);
     const int groups = t.groups;
-    for (int g = 0; g < groups; ++g) through[g] = SHIFTRIG_FMA(stiffness[g], psi[g], damping[g] * delta[g]);
-    through[groups] = 0;
-    for (int g = 0; g < groups; ++g) sum[g] = through[g + 1] - through[g];
+    passed[groups] = 0;
+    Block here = read(passed);
+    for (int g = 0; g < groups; g += lanes) {
+        const Block next = read(passed + g + lanes);
+        write(torque + g, one_behind(here, next) - here);
+        here = next;
+    }
     // passed[g] − passed[g + 1] belongs to g inside a path; heads hand theirs to another group.
     for (int i = 0; i < t.hanging; ++i) {
         const int head = t.head[i];
-        sum[head - 1] -= through[head];
-        sum[t.up[head]] += through[head];
+        torque[head - 1] -= passed[head];
+        torque[t.up[head]] += passed[head];
     }
     if (!t.drags) return;
-    for (int g = 0; g < groups; ++g) sum[g] = SHIFTRIG_FMA(-drag[g], q[g], sum[g]);
+    for (int g = 0; g < groups; ++g) torque[g] = SHIFTRIG_FMA(-t.drag[g], speed[g], torque[g]);
 }
 
 template <int count>
@@ -189,8 +230,7 @@ void solve(const TreePaths& t, const StageMatrix& stage, const double* momentum,
     Block here = links(0);
     for (int g = 0; g < t.groups; g += lanes) {
         const Block next = links(g + lanes);
-        const Block below = __builtin_shuffle(here, next, Lanes{1, 2, 3, 4});
-        write(right + g, read(p + g) + (below - here));
+        write(right + g, read(p + g) + (one_behind(here, next) - here));
         here = next;
     }
     for (int i = 0; i < t.hanging; ++i) {
@@ -206,96 +246,101 @@ void solve(const TreePaths& t, const StageMatrix& stage, const double* momentum,
 
 void finish(const TreePaths& t, const Twists& twists, double weight, const double* last_speed, double* speed,
             double* twist) SHIFTRIG_REALTIME {
-    const double* __restrict way = twists.way, * __restrict psi = twists.twist, * __restrict last = last_speed;
-    double* __restrict q = speed;
-    double* __restrict end = twist;
-    const auto turned = [=](int g, int up) {
-        return psi[g] + SHIFTRIG_FMA(weight, last[g] - last[up], way[g] - way[up]);
-    };
-    const int groups = t.groups;
-    for (int g = 0; g < groups; ++g) {
-        end[g] = turned(g, g - 1);
-        q[g] = last[g];
-    }
-    for (int p = 0; p < t.count; ++p) {
-        const int head = t.begin[p];
-        end[head] = t.parent[p] < 0 ? 0 : turned(head, t.parent[p]);
-    }
-    end[groups] = 0;  // read, and of no consequence
+    const double *way = twists.way, *psi = twists.twist;
+    along_paths(
+        t,
+        [=](int g) {
+            const Block last = read(last_speed + g);
+            write(speed + g, last);
+            return SHIFTRIG_BLOCK_FMA(all(weight), last, read(way + g));
+        },
+        [=](int g, const Block&, const Block& turned) { write(twist + g, read(psi + g) + turned); },
+        [=](int head, int parent) {
+            twist[head] = psi[head] + (SHIFTRIG_FMA(weight, last_speed[head], way[head]) -
+                                       SHIFTRIG_FMA(weight, last_speed[parent], way[parent]));
+        });
+    set_at_roots(t, twist);
+    twist[t.groups] = 0;  // read, and of no consequence
 }
 
 // Σ weight (a² + 4 b² + c²)
-inline double sum_squares(const double* weight, const double* a, const double* b, const double* c,
-                          int count) noexcept {
-    const auto squares = [=](int g) {
-        const Block first = read(a + g), second = read(b + g), third = read(c + g);
-        return SHIFTRIG_BLOCK_FMA(4. * second, second, SHIFTRIG_BLOCK_FMA(first, first, third * third));
-    };
-    Block sums = {}, others = {};
-    int g = 0;
-    for (; g + 2 * lanes <= count; g += 2 * lanes) {
-        sums = SHIFTRIG_BLOCK_FMA(read(weight + g), squares(g), sums);
-        others = SHIFTRIG_BLOCK_FMA(read(weight + g + lanes), squares(g + lanes), others);
-    }
-    sums += others;
-    double sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
-    for (; g < count; ++g) {
-        const double square = SHIFTRIG_FMA(4 * b[g], b[g], SHIFTRIG_FMA(a[g], a[g], c[g] * c[g]));
-        sum = SHIFTRIG_FMA(weight[g], square, sum);
-    }
-    return sum;
+inline Block squares(const Block& weight, const Block& a, const Block& b, const Block& c) noexcept {
+    return weight * SHIFTRIG_BLOCK_FMA(4. * b, b, SHIFTRIG_BLOCK_FMA(a, a, c * c));
 }
 
-double middle(const TreePaths& t, const MiddleSums& s, double* speed, double* rate) SHIFTRIG_REALTIME {
-    double* __restrict q = speed;
-    const double eighth = s.h / 8;
-    const double *__restrict q0 = s.speed[0], *__restrict q1 = s.speed[1], *__restrict n0 = s.net[0],
-                            *__restrict n1 = s.net[1], *__restrict inverse = t.inverse_mass;
+double middle(const TreePaths& t, const MiddleSums& s, double* speed) SHIFTRIG_REALTIME {
+    const double *q0 = s.speed[0], *q1 = s.speed[1], *n0 = s.net[0], *n1 = s.net[1], *inverse = t.inverse_mass,
+                 *d0 = s.rate[0], *d1 = s.rate[1];
+    const Block eighth = all(s.h / 8);
     const int groups = t.groups;
-    for (int g = 0; g < groups; ++g)
-        q[g] = SHIFTRIG_FMA(eighth, (n0[g] - n1[g]) * inverse[g], 0.5 * (q0[g] + q1[g]));
-    differences(t, speed, rate);
-    const double *d0 = s.rate[0], *d1 = s.rate[1];
-    const double loss = sum_squares(s.loss, d0, rate, d1, groups);
-    return t.drags ? loss + sum_squares(s.drag_loss, q0, q, q1, groups) : loss;
+    Block sums = {};
+    double at_heads = 0;
+    along_paths(
+        t,
+        [=](int g) {
+            const Block change = (read(n0 + g) - read(n1 + g)) * read(inverse + g);
+            const Block q = SHIFTRIG_BLOCK_FMA(eighth, change, 0.5 * (read(q0 + g) + read(q1 + g)));
+            write(speed + g, q);
+            return q;
+        },
+        [&](int g, const Block&, const Block& rate) {
+            sums += up_to(groups, g, squares(read(s.loss + g), read(d0 + g), rate, read(d1 + g)));
+        },
+        [&](int head, int parent) {
+            const double wrong = speed[head] - speed[head - 1], rate = speed[head] - speed[parent];
+            at_heads += 4 * s.loss[head] * (rate * rate - wrong * wrong);
+        });
+    if (t.drags) {
+        for (int g = 0; g < groups; g += lanes)
+            sums += up_to(groups, g, squares(read(s.drag_loss + g), read(q0 + g), read(speed + g), read(q1 + g)));
+    }
+    return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + at_heads;
 }
 
-Swing swing_error(const TreePaths& t, const StageSums& s, double* way, double* twist) SHIFTRIG_REALTIME {
-    const double *__restrict q0 = s.speed[0], *__restrict q1 = s.speed[1], *__restrict q2 = s.speed[2],
-                            *__restrict q3 = s.speed[3];
-    const double w0 = s.of_way[0], w1 = s.of_way[1], w2 = s.of_way[2], w3 = s.of_way[3];
-    double* __restrict turned = way;
+Swing swing_error(const TreePaths& t, const StageSums& s, double* way) SHIFTRIG_REALTIME {
+    const double *q0 = s.speed[0], *q1 = s.speed[1], *q2 = s.speed[2], *q3 = s.speed[3];
+    const Block w0 = all(s.of_way[0]), w1 = all(s.of_way[1]), w2 = all(s.of_way[2]), w3 = all(s.of_way[3]);
     const int groups = t.groups;
-    for (int g = 0; g < groups; ++g)
-        turned[g] = SHIFTRIG_FMA(w3, q3[g], SHIFTRIG_FMA(w2, q2[g], SHIFTRIG_FMA(w1, q1[g], w0 * q0[g])));
-    differences(t, way, twist);
-    twist[-1] = twist[groups] = 0;  // read, and of no consequence
-    const auto larger = [](const Block& a, const Block& b) { return a > b ? a : b; };
+    const double* const stiffness = t.stiffness;
     const auto magnitude = [](const Block& v) { return reinterpret_cast<Block>(reinterpret_cast<Lanes>(v) & INT64_MAX); };
+    const auto largest = [](const Block& a, const Block& b) { return a > b ? a : b; };
     Block errors = {}, speeds = {};
-    int g = 0;
-    for (; g + lanes <= groups; g += lanes) {
-        errors = larger(magnitude(read(twist + g)), errors);
-        speeds = larger(magnitude(read(q3 + g)), speeds);
-    }
     Swing swing;
-    const auto look = [&](double error, double speed) {
-        swing.error = error > swing.error ? error : swing.error;
-        swing.fastest = speed > swing.fastest ? speed : swing.fastest;
-    };
-    for (int i = 0; i < lanes; ++i) look(errors[i], speeds[i]);
-    for (; g < groups; ++g) look(__builtin_fabs(twist[g]), __builtin_fabs(q3[g]));
+    along_paths(
+        t,
+        [=](int g) {
+            return SHIFTRIG_BLOCK_FMA(
+                w3, read(q3 + g),
+                SHIFTRIG_BLOCK_FMA(w2, read(q2 + g), SHIFTRIG_BLOCK_FMA(w1, read(q1 + g), w0 * read(q0 + g))));
+        },
+        [&](int g, const Block& turned, const Block& twisted) {
+            write(way + g, turned);
+            const Block error = read(stiffness + g) > 0. ? magnitude(twisted) : Block{};
+            errors = largest(up_to(groups, g, error), errors);
+            speeds = largest(up_to(groups, g, magnitude(read(q3 + g))), speeds);
+        },
+        [&](int head, int parent) {
+            const double error = __builtin_fabs(way[head] - way[parent]);
+            swing.error = error > swing.error ? error : swing.error;
+        });
+    way[-1] = way[groups] = 0;  // read, and of no consequence
+    for (int i = 0; i < lanes; ++i) {
+        swing.error = errors[i] > swing.error ? errors[i] : swing.error;
+        swing.fastest = speeds[i] > swing.fastest ? speeds[i] : swing.fastest;
+    }
     return swing;
 }
 
-void correct(const TreePaths& t, const StageMatrix& stage, double* momentum, const double* error,
-             double factor, const SwingWork& work, double* speed, double* twist) SHIFTRIG_REALTIME {
+void correct(const TreePaths& t, const StageMatrix& stage, double* momentum, const double* way, double factor,
+             const SwingWork& work, double* speed, double* twist) SHIFTRIG_REALTIME {
     // S e, then S of that: the momenta and twists it stands for are M q and ψ + hγ δ.
-    double *const first = work.first, *const second = work.second;
+    double *const error = work.error, *const first = work.first, *const second = work.second;
+    differences(t, way, error);
+    const int groups = t.groups;
+    error[-1] = error[groups] = 0;  // read, and of no consequence
     solve(t, stage, momentum, {error, error, 0}, first);
     const double* mass = t.mass;
-    const int groups = t.groups;
-    first[-1] = first[groups] = 0;  // read, and of no consequence
+    first[-1] = first[groups] = 0;  // likewise
     for (int g = 0; g < groups; ++g) momentum[g] = mass[g] * first[g];
     solve(t, stage, momentum, {error, first, stage.weight}, second);
     differences(t, second, work.rate);
