@@ -215,6 +215,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
     }
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
         const int leader = mode.rows[r] - m.pairs - m.meshes;
+        if (is_held(w, leader, end)) continue;
         const double drive = release_drive(w, mode, leader, end);
         if (drive <= 0) {
             const double left = loss_left(w, leader, end);

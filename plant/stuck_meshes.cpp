@@ -154,6 +154,11 @@ double loss_left(const Work& w, int mesh, const Sample& s) SHIFTRIG_REALTIME {
     return loss.allowed - std::fabs(loss.needed);
 }
 
+bool is_held(const Work& w, int leader, const Sample& s) SHIFTRIG_REALTIME {
+    const LossAtRest loss = loss_at_rest(w, leader, s);
+    return std::fabs(loss.needed) < (1 - 1e-6) * loss.allowed;
+}
+
 bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     unsigned char* trial = w.scratch.trial.data();
@@ -219,7 +224,7 @@ bool release_stuck_meshes(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIM
     const ModelData& m = w.model;
     for (int r = 0; r < mode.row_count; ++r) {
         const int leader = mode.rows[r] - m.pairs - m.meshes;
-        if (leader >= 0 && try_release(w, mode, leader, s)) return true;
+        if (leader >= 0 && !is_held(w, leader, s) && try_release(w, mode, leader, s)) return true;
     }
     return false;
 }

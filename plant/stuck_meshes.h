@@ -13,6 +13,10 @@ LossAtRest loss_at_rest(const Work& work, int mesh, const Sample& sample) SHIFTR
 // What is left of the loss that a stuck mesh can take [Nm].
 double loss_left(const Work& work, int mesh, const Sample& sample) SHIFTRIG_REALTIME;
 
+// Does the leader's own loss suffice, beyond rounding, whatever its family could add? Then nothing goes, and there is no
+// need to try.
+bool is_held(const Work& work, int leader, const Sample& sample) SHIFTRIG_REALTIME;
+
 // A family is let go together, each member with the sign that the motion gives it. It goes if, one way and with
 // its own consistent losses, it accelerates that way. Where other stuck meshes hold it only together, one of those goes
 // with it. Returns the acceleration towards the better of all ways beyond rounding, positive if it goes, with the
