@@ -144,8 +144,8 @@ void complete_swing(const ModelData& m, const TreeMode& t, const TreeWork& v, do
     kernel.combine(t.paths, sums, v.momentum, v.way);
     kernel.give(efforts(t, swing_impulse.effort, stages, v, h), nullptr, v.momentum);
     constexpr double factor = -excess / embedded / gamma;
-    kernel.correct(t.paths, stage, v.momentum, v.way, factor, {v.swing[0], v.swing[1], v.swing[2], v.swing[3]},
-                   end.speed, end.twist);
+    kernel.correct(t.paths, stage, v.momentum, v.way, factor,
+                   {v.swing[0], v.swing[1], v.swing[2], v.swing[3]}, end.speed, end.twist);
 }
 
 }  // namespace
@@ -241,8 +241,8 @@ double tree_middle(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const double h = s.end().at.time - s.begin().at.time;
     const GroupState &begin = s.begin().groups, &end = s.end().groups;  // advance_tree() left them
     GroupState& groups = s.middle.groups;
-    const MiddleSums sums{h,      {begin.speed, end.speed}, {begin.net, end.net}, {begin.rate, end.rate},
-                          t.loss, t.drag_loss};
+    const MiddleSums sums{
+        h, {begin.speed, end.speed}, {begin.net, end.net}, {begin.rate, end.rate}, t.loss, t.drag_loss};
     const double loss = h / 6 * m.tree->kernel.middle(t.paths, sums, groups.speed);
     for (int i = 0; i < m.auxiliary; ++i) {
         s.middle.auxiliary[i] = 0.5 * (s.begin().auxiliary[i] + s.end().auxiliary[i]) +

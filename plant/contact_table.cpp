@@ -8,8 +8,7 @@
 
 namespace shiftrig::plant::detail {
 
-ContactTable::ContactTable(const ModelData& m)
-    : contact(static_cast<std::size_t>(m.contact_bytes)) {
+ContactTable::ContactTable(const ModelData& m) : contact(static_cast<std::size_t>(m.contact_bytes)) {
     const int pairs = whole_panels(m.pairs), meshes = whole_panels(m.meshes);
     numbers = aligned_doubles(static_cast<std::size_t>(m.law_rows + 5 * pairs + 3 * meshes) + loop_slack);
     double* at = numbers.data()->value;
@@ -34,7 +33,8 @@ constexpr double state_codes[] = {0, 1, 1, 2};  // of PairState
 void tabulate_contact(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     ContactTable& table = w.operators.table;
     if (table.known && table.viscosity == w.operators.oil.viscosity &&
-        same_bytes(table.contact.data(), w.contact, table.contact.size())) return;
+        same_bytes(table.contact.data(), w.contact, table.contact.size()))
+        return;
     const ModelData& m = w.model;
     table.known = true;
     table.viscosity = w.operators.oil.viscosity;

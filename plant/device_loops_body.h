@@ -260,6 +260,6 @@ double* show_shafts(const ShaftValues& s, double* next) SHIFTRIG_REALTIME {
     return twist + s.count;
 }
 
-constexpr DeviceLoops device_loops{senses_hold,      may_dip,         slide, press, book, subtract,
-                                   share_of_squares, weighted_square, same,  copy,  heat, pick_up,
-                                   show_clutches,    show_shafts};
+constexpr DeviceLoops device_loops{senses_hold, may_dip,          slide,           press,      book,
+                                   subtract,    share_of_squares, weighted_square, same,       copy,
+                                   heat,        pick_up,          show_clutches,   show_shafts};

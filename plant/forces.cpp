@@ -38,9 +38,17 @@ void pair_forces(const Work& w, const unsigned char* contact, Sample& s) noexcep
 FrictionTerms friction_terms(const Work& w, const double* load, const Sample& s) noexcept {
     const ModelData& m = w.model;
     const ContactTable& table = w.operators.table;
-    return {load,        s.slip,             table.sense,         table.drag,
-            table.base,  table.rise,         table.inverse_speed, m.static_factor.data(),
-            table.fades, m.drag_speed_limit, m.actuated_pairs};
+    return {load,
+            s.slip,
+            table.sense,
+            table.drag,
+            table.base,
+            table.rise,
+            table.inverse_speed,
+            m.static_factor.data(),
+            table.fades,
+            m.drag_speed_limit,
+            m.actuated_pairs};
 }
 
 // Of pairs loaded by nature: what loads them is known after the laws.
@@ -49,7 +57,8 @@ void natural_forces(const Work& w, Sample& s) noexcept {
     const ContactTable& table = w.operators.table;
     for (int k = m.actuated_pairs; k < m.pairs; ++k) {
         const auto i = static_cast<std::size_t>(k);
-        const double factor = table.rise[k] == 0 ? table.base[k] : sliding_factor(m.pair_laws[i].friction, s.slip[k]);
+        const double factor =
+            table.rise[k] == 0 ? table.base[k] : sliding_factor(m.pair_laws[i].friction, s.slip[k]);
         s.holding[k] = s.load[k] * m.static_factor[i];
         s.sliding[k] = s.load[k] * factor;
         s.f[k] = table.sense[k] * s.sliding[k];
@@ -273,7 +282,8 @@ void end_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     m.kernel.loops.press(friction_terms(w, load, s), s.f, s.holding, s.sliding);
     clear_few(s.f + m.actuated_pairs, s.f + m.forces);
     tabled_forces(w, s, true);
-    for (int i = 0; i < w.scratch.moving_count; ++i) {  // one that is about to engage shows what it would pass
+    for (int i = 0; i < w.scratch.moving_count;
+         ++i) {  // one that is about to engage shows what it would pass
         const int k = w.scratch.moving[static_cast<std::size_t>(i)];
         if (w.contact[k] != free_running || s.load[k] == 0) continue;
         s.sliding[k] =

@@ -105,8 +105,7 @@ void OperatorsData::place_trees(const ModelData& m) {
         place_tree(m, trees[i],
                    {memory.data()->value + i * sizes.doubles, integers.data() + i * sizes.integers,
                     bytes.data() + i * sizes.bytes, tree_masses.data() + i * sizes.masses,
-                    tree_forces.data() + i * sizes.forces,
-                    tree_edges.data() + i * sizes.edges});
+                    tree_forces.data() + i * sizes.forces, tree_edges.data() + i * sizes.edges});
         modes[i].tree = &trees[i];
     }
 }

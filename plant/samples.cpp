@@ -101,8 +101,8 @@ void Scratch::fill_with_nan() noexcept {
     for (auto* numbers : {&s.torque_copy, &s.held, &s.standstill}) {
         std::fill(numbers->begin(), numbers->end(), nan);
     }
-    for (auto* lines : {&s.buffer, &s.vectors, &s.works, &s.workspace_memory, &s.operator_memory,
-                        &s.ledger_memory}) {
+    for (auto* lines :
+         {&s.buffer, &s.vectors, &s.works, &s.workspace_memory, &s.operator_memory, &s.ledger_memory}) {
         for (detail::CacheLine& line : *lines) std::fill(std::begin(line.value), std::end(line.value), nan);
     }
     for (detail::PairLoad& load : s.loads) {

@@ -100,9 +100,9 @@ struct ScratchData {
     double dissipated = 0, input_work = 0;  // in this step [J]
     double stored_before = 0, stored = 0;   // at its beginning, at its end [J]
     AlignedDoubles workspace_memory;
-    double* workspace = nullptr;  // of the mode builder
-    TreeWork tree;                // in its place, where the model has a tree
-    std::vector<double> standstill;         // of rearrange(), which builds modes on its way
+    double* workspace = nullptr;     // of the mode builder
+    TreeWork tree;                   // in its place, where the model has a tree
+    std::vector<double> standstill;  // of rearrange(), which builds modes on its way
     std::vector<int> workspace_index;
     std::vector<int> piece;                         // per mass
     AlignedDoubles operator_memory, ledger_memory;  // operators of a partial step, of a part of one

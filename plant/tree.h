@@ -52,7 +52,7 @@ struct TreeTopology {
     std::vector<Ground> grounds;         // brakes and resistances
     std::vector<double> ground_damping;  // by position [Nm s/rad]
     std::vector<double> weight;          // by unknown: share of a torque that is not unique
-    bool lossy = false;  // any gear with losses
+    bool lossy = false;                  // any gear with losses
     TreeKernel kernel;
 };
 
@@ -91,6 +91,7 @@ struct TreeMode {
     int* up = nullptr;
     int* path_begin = nullptr;
     int* path_parent = nullptr;
+    double* inside = nullptr;
     int* head = nullptr;
     int* run_begin = nullptr;
     int* run_parent = nullptr;
@@ -103,7 +104,7 @@ struct TreeMode {
     double* loss = nullptr;             // power lost in the link's damper per δ²
     double* drag_loss = nullptr;        // power lost to the housing per q²
     StageMatrix matrix;                 // for the model's step size
-    bool swings = false;  // may have swings that a step of the model's size damps noticeably
+    bool swings = false;                // may have swings that a step of the model's size damps noticeably
     // q = factor · z[slot], ψ = factor · z[slot]; without a shaft the factor is 0.
     int* speed_slot = nullptr;
     int* twist_slot = nullptr;
@@ -114,13 +115,14 @@ struct TreeMode {
     int* shaft_group = nullptr;
     double* mass_ratio = nullptr;
     double* shaft_ratio = nullptr;
-    bool exact = false;            // all factors are ±1: there and back it is the same number
+    bool exact = false;  // all factors are ±1: there and back it is the same number
     // Forces that can be other than 0 (not those of locked pairs): what they slip at, and what they take from one or two
     // groups.
     int force_count = 0;
     int* force = nullptr;
-    GroupPairs force_slip, force_share;  // the shares with factors r̂: the group's momentum changes by −factor · f
-    GroupPairs turning;                  // per mesh, of what its loss acts on
+    GroupPairs force_slip,
+        force_share;     // the shares with factors r̂: the group's momentum changes by −factor · f
+    GroupPairs turning;  // per mesh, of what its loss acts on
     // Masses of groups with rigid devices inside, and the link torques that act on them.
     int inner_count = 0;
     TreeMass* inner = nullptr;
@@ -200,7 +202,7 @@ void place_groups(const ModelData& model, GroupState& groups, double* memory);
 struct TreeWork {
     double *momentum = nullptr, *way = nullptr, *load = nullptr, *potential = nullptr, *speed[3] = {},
            *swing[4] = {};
-    StageMatrix matrix;                             // of a part of a step
+    StageMatrix matrix;            // of a part of a step
     const double* effort[4] = {};  // f of the stages,
     double* stage_effort[3] = {};  // of which these are those after the first
     double* auxiliary[4] = {};

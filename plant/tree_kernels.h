@@ -11,11 +11,12 @@ namespace shiftrig::plant::detail {
 // The groups of a mode as the loops see them. Vectors may be read one element beyond either end.
 struct TreePaths {
     int groups = 0;
-    int count = 0;                // paths
-    const int* begin = nullptr;   // of each path, and `groups` at the end
-    const int* parent = nullptr;  // group that the head hangs on, −1: none
-    const int* up = nullptr;      // parent of every group; roots, with L = 0, name group 0
-    // Heads that hang on another group than the one before them.
+    int count = 0;                   // paths
+    const int* begin = nullptr;      // of each path, and `groups` at the end
+    const int* parent = nullptr;     // group that the head hangs on, −1: none
+    const int* up = nullptr;         // parent of every group; roots, with L = 0, name group 0
+    const double* inside = nullptr;  // per group: 1 where its parent is the one before it, else 0
+    // Heads that hang on another group.
     int hanging = 0;
     const int* head = nullptr;
     // Paths with the roots behind them, whose L of 0 ends no chain of operations: what the solutions follow. The same fields.
@@ -81,7 +82,7 @@ struct MiddleSums {
 };
 using Middle = double (*)(const TreePaths&, const MiddleSums&, double* speed) SHIFTRIG_REALTIME;
 
-// The largest difference e of a twist with stiffness from that of the embedded method [rad], and the largest speed [rad/s].
+// The largest difference e of a twist from that of the embedded method [rad], and the largest speed [rad/s].
 struct Swing {
     double error = 0, fastest = 0;
 };

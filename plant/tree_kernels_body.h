@@ -45,7 +45,8 @@ inline Block up_to(int groups, int g, const Block& v) noexcept {
 // Of value(g), in blocks: use(g, value, difference to the group before). At heads of paths that is nobody's business;
 // at_head(g, parent) puts right what came of it.
 template <typename Value, typename Use, typename AtHead>
-inline void along_paths(const TreePaths& t, const Value& value, const Use& use, const AtHead& at_head) noexcept {
+inline void along_paths(const TreePaths& t, const Value& value, const Use& use,
+                        const AtHead& at_head) noexcept {
     Block last = {};
     for (int g = 0, groups = t.groups; g < groups; g += lanes) {
         const Block here = value(g);
@@ -77,7 +78,8 @@ void shaft_torques(const TreePaths& t, const double* speed, const double* twist,
         t, [=](int g) { return read(speed + g); },
         [=](int g, const Block&, const Block& change) {
             write(rate + g, change);
-            write(passed + g, SHIFTRIG_BLOCK_FMA(read(stiffness + g), read(twist + g), read(damping + g) * change));
+            write(passed + g,
+                  SHIFTRIG_BLOCK_FMA(read(stiffness + g), read(twist + g), read(damping + g) * change));
         },
         [=](int head, int parent) {
             rate[head] = speed[head] - speed[parent];
@@ -107,8 +109,7 @@ void combine_speeds(const TreePaths& t, const StageSums& s, double* __restrict m
                     double* __restrict way) noexcept {
     constexpr int b = count > 1 ? 1 : 0, c = count > 2 ? 2 : 0,
                   d = count > 3 ? 3 : 0;  // where there are fewer terms the last ones are unused
-    const double* __restrict q0 = s.speed[0], * __restrict q1 = s.speed[b], * __restrict q2 = s.speed[c],
-                             * __restrict q3 = s.speed[d];
+    const double* __restrict q0 = s.speed[0], * __restrict q1 = s.speed[b], * __restrict q2 = s.speed[c], * __restrict q3 = s.speed[d];
     const double m0 = s.of_momentum[0], m1 = s.of_momentum[b], m2 = s.of_momentum[c], m3 = s.of_momentum[d];
     const double w0 = s.of_way[0], w1 = s.of_way[b], w2 = s.of_way[c], w3 = s.of_way[d];
     const double of_net = s.of_net;
@@ -269,8 +270,8 @@ inline Block squares(const Block& weight, const Block& a, const Block& b, const 
 }
 
 double middle(const TreePaths& t, const MiddleSums& s, double* speed) SHIFTRIG_REALTIME {
-    const double *q0 = s.speed[0], *q1 = s.speed[1], *n0 = s.net[0], *n1 = s.net[1], *inverse = t.inverse_mass,
-                 *d0 = s.rate[0], *d1 = s.rate[1];
+    const double *q0 = s.speed[0], *q1 = s.speed[1], *n0 = s.net[0], *n1 = s.net[1],
+                 *inverse = t.inverse_mass, *d0 = s.rate[0], *d1 = s.rate[1];
     const Block eighth = all(s.h / 8);
     const int groups = t.groups;
     Block sums = {};
@@ -292,7 +293,8 @@ double middle(const TreePaths& t, const MiddleSums& s, double* speed) SHIFTRIG_R
         });
     if (t.drags) {
         for (int g = 0; g < groups; g += lanes)
-            sums += up_to(groups, g, squares(read(s.drag_loss + g), read(q0 + g), read(speed + g), read(q1 + g)));
+            sums +=
+                up_to(groups, g, squares(read(s.drag_loss + g), read(q0 + g), read(speed + g), read(q1 + g)));
     }
     return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + at_heads;
 }
@@ -301,8 +303,10 @@ Swing swing_error(const TreePaths& t, const StageSums& s, double* way) SHIFTRIG_
     const double *q0 = s.speed[0], *q1 = s.speed[1], *q2 = s.speed[2], *q3 = s.speed[3];
     const Block w0 = all(s.of_way[0]), w1 = all(s.of_way[1]), w2 = all(s.of_way[2]), w3 = all(s.of_way[3]);
     const int groups = t.groups;
-    const double* const stiffness = t.stiffness;
-    const auto magnitude = [](const Block& v) { return reinterpret_cast<Block>(reinterpret_cast<Lanes>(v) & INT64_MAX); };
+    const double* const inside = t.inside;
+    const auto magnitude = [](const Block& v) {
+        return reinterpret_cast<Block>(reinterpret_cast<Lanes>(v) & INT64_MAX);
+    };
     const auto largest = [](const Block& a, const Block& b) { return a > b ? a : b; };
     Block errors = {}, speeds = {};
     Swing swing;
@@ -311,11 +315,12 @@ Swing swing_error(const TreePaths& t, const StageSums& s, double* way) SHIFTRIG_
         [=](int g) {
             return SHIFTRIG_BLOCK_FMA(
                 w3, read(q3 + g),
-                SHIFTRIG_BLOCK_FMA(w2, read(q2 + g), SHIFTRIG_BLOCK_FMA(w1, read(q1 + g), w0 * read(q0 + g))));
+                SHIFTRIG_BLOCK_FMA(w2, read(q2 + g),
+                                   SHIFTRIG_BLOCK_FMA(w1, read(q1 + g), w0 * read(q0 + g))));
         },
         [&](int g, const Block& turned, const Block& twisted) {
             write(way + g, turned);
-            const Block error = read(stiffness + g) > 0. ? magnitude(twisted) : Block{};
+            const Block error = read(inside + g) > 0. ? magnitude(twisted) : Block{};
             errors = largest(up_to(groups, g, error), errors);
             speeds = largest(up_to(groups, g, magnitude(read(q3 + g))), speeds);
         },
@@ -388,7 +393,8 @@ inline void give_efforts(const Efforts& e, const double* scale, double* sum) noe
             const Block term = side_by_side ? read(e.effort[j] + place[0]) : gather(e.effort[j], place);
             effort = SHIFTRIG_BLOCK_FMA(all(e.weight[j]), term, effort);
         }
-        const Block first = read(e.share.of_first + i) * effort, second = read(e.share.of_second + i) * effort;
+        const Block first = read(e.share.of_first + i) * effort,
+                    second = read(e.share.of_second + i) * effort;
         for (int j = 0; j < lanes; ++j) {
             give(e.share.first[i + j], first[j]);
             give(e.share.second[i + j], second[j]);
@@ -415,7 +421,8 @@ void spread(const int* group, const double* ratio, const double* of_group, int c
     for (; i < count; ++i) values[i] = ratio[i] * of_group[group[i]];
 }
 
-constexpr TreeKernel kernel{shaft_torques, combine, solve, finish, middle, swing_error, correct, slips, give, spread};
+constexpr TreeKernel kernel{shaft_torques, combine, solve, finish, middle,
+                            swing_error,   correct, slips, give,   spread};
 
 }  // namespace
 }  // namespace shiftrig::plant::detail

@@ -28,7 +28,8 @@ TreeSizes::TreeSizes(const ModelData& m) {
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
     forces = 2 * static_cast<std::size_t>(m.forces);
     const std::size_t pairs = pair_stride(m);
-    doubles = (19 + matrix_parts) * n + 6 * pairs + static_cast<std::size_t>(whole_panels(static_cast<int>(grounds)));
+    doubles = (20 + matrix_parts) * n + 6 * pairs +
+              static_cast<std::size_t>(whole_panels(static_cast<int>(grounds)));
     integers = 19 * n + 2 * grounds + 7 * pairs;
     bytes = (n + 7) / 8 * 8;
     masses = n;
@@ -42,8 +43,8 @@ void place_tree(const ModelData& m, TreeMode& t, const TreeMemory& memory) noexc
     const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
     for (double** array :
          {&t.ratio, &t.force_ratio, &t.mass, &t.inverse_mass, &t.drag, &t.stiffness, &t.damping, &t.loss,
-          &t.drag_loss, &t.edge_own, &t.edge_up, &t.network_inverse, &t.network_lower,
-          &t.speed_factor, &t.twist_factor, &t.mass_ratio, &t.shaft_ratio}) {
+          &t.drag_loss, &t.edge_own, &t.edge_up, &t.network_inverse, &t.network_lower, &t.speed_factor,
+          &t.twist_factor, &t.mass_ratio, &t.shaft_ratio, &t.inside}) {
         *array = doubles;
         doubles += n;
     }
@@ -51,9 +52,9 @@ void place_tree(const ModelData& m, TreeMode& t, const TreeMemory& memory) noexc
     place_matrix(t.matrix, t.end_factor + 2 * n, n);
     const std::size_t pairs = pair_stride(m);
     t.ground_factor = t.end_factor + (2 + matrix_parts) * n + 6 * pairs;
-    for (int** array : {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.head,
-                        &t.run_begin, &t.run_parent, &t.speed_slot, &t.twist_slot, &t.mass_group,
-                        &t.shaft_group, &t.up, &t.spent}) {
+    for (int** array :
+         {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.head, &t.run_begin,
+          &t.run_parent, &t.speed_slot, &t.twist_slot, &t.mass_group, &t.shaft_group, &t.up, &t.spent}) {
         *array = integers;
         integers += n;
     }
@@ -149,7 +150,8 @@ void find_paths(TreeMode& t) {
     TreePaths& paths = t.paths;
     paths.count = paths.run_count = paths.hanging = 0;
     for (int g = 0; g < paths.groups; ++g) {
-        if (g > 0 && t.parent[g] == g - 1) continue;
+        t.inside[g] = g > 0 && t.parent[g] == g - 1 ? 1 : 0;
+        if (t.inside[g] != 0) continue;
         if (g == 0 || t.parent[g] >= 0) {
             t.run_begin[paths.run_count] = g;
             t.run_parent[paths.run_count++] = t.parent[g];
@@ -168,6 +170,7 @@ void find_paths(TreeMode& t) {
     paths.begin = t.path_begin;
     paths.parent = t.path_parent;
     paths.head = t.head;
+    paths.inside = t.inside;
     paths.mass = t.mass;
     paths.inverse_mass = t.inverse_mass;
     paths.drag = t.drag;
@@ -192,8 +195,7 @@ void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
         t.mass_ratio[topology.mass[i]] = t.ratio[p];
         if (rigid[p]) {
             t.inner[t.inner_count++] = {
-                p, t.group[p],
-                t.ratio[p] * m.structure.inertia[static_cast<std::size_t>(topology.mass[i])],
+                p, t.group[p], t.ratio[p] * m.structure.inertia[static_cast<std::size_t>(topology.mass[i])],
                 t.ratio[p] * topology.ground_damping[i]};
             if (t.grounded[t.group[p]] || t.first[t.group[p]] == p) t.spent[t.spent_count++] = p;
         }
@@ -267,8 +269,9 @@ void find_forces(const ModelData& m, const Mode& mode, TreeMode& t) {
 // Can anything in the mode swing or fade fast enough to matter? Nothing is faster than the bounds of Gershgorin's
 // circles of M⁻¹ K and M⁻¹ D.
 void find_swing(const ModelData& m, TreeMode& t) {
-    double swing = 0, fade = 0;                         // ω², 1/s
-    double *stiffness = t.matrix.inverse, *damping = t.matrix.lower;  // Σ of the links at each group; not yet in use
+    double swing = 0, fade = 0;  // ω², 1/s
+    double *stiffness = t.matrix.inverse,
+           *damping = t.matrix.lower;  // Σ of the links at each group; not yet in use
     std::fill(stiffness, stiffness + t.paths.groups, 0.);
     std::copy(t.drag, t.drag + t.paths.groups, damping);
     for (int g = t.paths.groups - 1; g >= 0; --g) {

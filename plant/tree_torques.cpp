@@ -100,8 +100,7 @@ void complete_groups(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTI
     const TreeMode& t = *mode.tree;
     GroupState& groups = s.groups;
     const TreeKernel& kernel = w.model.tree->kernel;
-    kernel.shaft_torques(t.paths, groups.speed, groups.twist, groups.rate, groups.passed,
-                                       groups.net);
+    kernel.shaft_torques(t.paths, groups.speed, groups.twist, groups.rate, groups.passed, groups.net);
     kernel.give({t.force_share, t.force, t.force_count, 1, {s.f}, {-1}}, nullptr, groups.net);
     groups.mode = &mode;
     groups.modes_built = w.operators.misses;

@@ -105,13 +105,16 @@ TEST_P(DeviceLoopsOf, PressSlideAndDragAsTheLawsDo) {
         for (int k = 0; k < count; ++k) {
             sense[at(k)] = k % 3 - 1;
             if (k % 4 == 0) rise[at(k)] = 0;
-            if (k % 7 == 1) inverse_speed[at(k)] = 745.1 / std::fabs(slip[at(k)]);  // the smallest numbers there are
-            if (k % 7 == 2) inverse_speed[at(k)] = 1e5;                               // and less
+            if (k % 7 == 1)
+                inverse_speed[at(k)] = 745.1 / std::fabs(slip[at(k)]);  // the smallest numbers there are
+            if (k % 7 == 2) inverse_speed[at(k)] = 1e5;                 // and less
         }
         for (const bool fades : {false, true}) {
-            const FrictionTerms terms{load.data(), slip.data(), sense.data(), drag.data(), base.data(), rise.data(),
-                                      inverse_speed.data(), rest.data(), fades, 60, count};
-            std::vector<double> holds = numbers(count), slides = numbers(count), f = numbers(count), stage = f;
+            const FrictionTerms terms{
+                load.data(),          slip.data(), sense.data(), drag.data(), base.data(), rise.data(),
+                inverse_speed.data(), rest.data(), fades,        60,          count};
+            std::vector<double> holds = numbers(count), slides = numbers(count), f = numbers(count),
+                                stage = f;
             loops.press(terms, f.data(), holds.data(), slides.data());
             loops.slide(terms, stage.data());
             for (int k = 0; k < count; ++k) {
@@ -283,6 +286,39 @@ TEST_P(DeviceLoopsOf, PickUpsReadAsTheLawDoes) {
                 ASSERT_EQ(since[at(i)], state.since_edge) << i;
             }
             begin = end;
+        }
+    }
+}
+
+TEST_P(DeviceLoopsOf, ShowShaftsByQuantity) {
+    for (int count = 0; count <= most; ++count) {
+        const std::vector<double> stiffness = numbers(count), damping = numbers(count),
+                                  twist = numbers(count), rate = numbers(count);
+        std::vector<double> shown(at(2 * count) + loop_slack, 0);
+        double* const end = loops.show_shafts(
+            {stiffness.data(), damping.data(), twist.data(), rate.data(), count}, shown.data());
+        EXPECT_EQ(end - shown.data(), 2 * count);
+        for (int e = 0; e < count; ++e) {
+            EXPECT_EQ(shown[at(e)], stiffness[at(e)] * twist[at(e)] + damping[at(e)] * rate[at(e)]);
+            EXPECT_EQ(shown[at(count + e)], twist[at(e)]);
+        }
+    }
+}
+
+TEST_P(DeviceLoopsOf, SeeTheOneBitThatDiffersAndCopyEveryNumber) {
+    for (int count = 0; count <= most; ++count) {
+        const std::vector<double> a = numbers(count);
+        std::vector<double> b(at(count) + loop_slack, -7);
+        loops.copy(a.data(), count, b.data());
+        EXPECT_EQ(std::vector<double>(b.begin(), b.begin() + count),
+                  std::vector<double>(a.begin(), a.begin() + count));
+        EXPECT_EQ(b[at(count)], -7) << "nothing is written behind the last";
+        EXPECT_TRUE(loops.same(a.data(), b.data(), count));
+        for (int i = 0; i < count; ++i) {
+            const double kept = b[at(i)];
+            b[at(i)] = std::nextafter(kept, 1e9);
+            EXPECT_FALSE(loops.same(a.data(), b.data(), count)) << i << " of " << count;
+            b[at(i)] = kept;
         }
     }
 }

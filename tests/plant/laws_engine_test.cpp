@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "plant/laws/engine.h"
+#include "plant/plant.h"
 
 namespace shiftrig::plant {
 namespace {
@@ -136,6 +137,35 @@ TEST(Engine, StallsHoldsAndStartsAgain) {
     }
     EXPECT_EQ(mode, EngineMode::stalled) << "a blocked engine gives up";
     EXPECT_NEAR(steps, 3000, 1);
+}
+
+// In a machine, with and without what makes it a device that can stall: the boost builds up in both.
+TEST(EngineInAMachine, BuildsUpItsBoostWhetherItCanStallOrNot) {
+    for (const bool stalls : {true, false}) {
+        Engine engine = reference_engine();
+        engine.name = "diesel";
+        engine.mass = "crank";
+        if (!stalls) engine.stall_speed = engine.friction_constant = 0;
+        Description d;
+        d.name = "engine";
+        d.masses = {{"crank", 1e7, Motion::rotating, 1500 * rpm}};
+        d.engines = {engine};
+        const Model model = Model::build(d);
+        Operators operators(model);
+        State state(model);
+        Scratch scratch(model);
+        Inputs inputs(model);
+        Outputs outputs(model);
+        inputs.value[static_cast<std::size_t>(model.input("driver.throttle"))] = 1;
+        const auto load = static_cast<std::size_t>(model.output("engine.diesel.load"));
+        for (int n = 0; n < 5000; ++n) {
+            step(model, operators, state, inputs, outputs, scratch);
+            if (n == 300) {
+                EXPECT_LT(outputs.value[load], 0.9) << "it lags";
+            }
+        }
+        EXPECT_NEAR(outputs.value[load], 1, 3e-3) << (stalls ? "can stall" : "cannot stall");
+    }
 }
 
 }  // namespace
