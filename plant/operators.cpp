@@ -92,9 +92,9 @@ void OperatorsData::place_matrices(const ModelData& m) {
 
 // A long chain keeps few modes: building one costs no more than a step.
 void OperatorsData::place_trees(const ModelData& m) {
-    const TreeSizes sizes(m);
     modes.resize(fewest_modes);
     trees.resize(modes.size());
+    const TreeSizes sizes = place_tree(m, trees.front(), {});
     memory = aligned_doubles(modes.size() * sizes.doubles);
     integers.assign(modes.size() * sizes.integers, 0);
     bytes.assign(modes.size() * sizes.bytes, 0);

@@ -76,7 +76,7 @@ ScratchData::ScratchData(const ModelData& m) {
     works = aligned_doubles(static_cast<std::size_t>(m.forces) + loop_slack);
     work = works.data()->value;
     workspace_memory =
-        aligned_doubles(static_cast<std::size_t>(m.tree ? tree_work_size(m) : workspace_doubles(m)));
+        aligned_doubles(m.tree ? tree_work_size(m) : static_cast<std::size_t>(workspace_doubles(m)));
     workspace = workspace_memory.data()->value;
     if (m.tree) place_tree_work(m, tree, workspace);
     standstill.assign(static_cast<std::size_t>(rest_workspace(m)), 0.);

@@ -151,10 +151,9 @@ struct TreeMode {
     double* ground_factor = nullptr;
 };
 
-// Memory of tree modes.
+// Memory of one tree mode, in numbers of each kind; of the doubles whole cache lines.
 struct TreeSizes {
     std::size_t doubles = 0, integers = 0, bytes = 0, masses = 0, forces = 0, edges = 0;
-    explicit TreeSizes(const ModelData& model);
 };
 struct TreeMemory {
     double* doubles = nullptr;
@@ -164,7 +163,8 @@ struct TreeMemory {
     TreeForce* forces = nullptr;
     TreeEdge* edges = nullptr;
 };
-void place_tree(const ModelData& model, TreeMode& tree, const TreeMemory& memory) noexcept;
+// Hands it out, and says how much it takes (without memory: only that).
+TreeSizes place_tree(const ModelData& model, TreeMode& tree, const TreeMemory& memory) noexcept;
 
 // Fills mode.tree and what a mode says about itself (rows, bound, redundant) from mode.key.
 void build_tree_mode(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
@@ -178,9 +178,6 @@ void factor_network(const ModelData& model, TreeMode& tree) SHIFTRIG_REALTIME;
 
 // L D Lᵀ of M + hγ D' + (hγ)² K' for the weight hγ of the matrix, which has its memory.
 void factor_stage(const TreeMode& tree, StageMatrix& matrix) SHIFTRIG_REALTIME;
-// The parts of the matrix, each so many doubles further in memory.
-constexpr int matrix_parts = 8;
-void place_matrix(StageMatrix& matrix, double* memory, std::size_t stride) noexcept;
 
 // ---- motion of the groups -----------------------------------------------------------------------------
 
@@ -195,8 +192,8 @@ struct GroupState {
     const Mode* mode = nullptr;
     std::int64_t modes_built = 0;
 };
-std::size_t group_state_size(const ModelData& model);  // in doubles
-void place_groups(const ModelData& model, GroupState& groups, double* memory);
+std::size_t group_state_size(const ModelData& model) noexcept;  // in doubles
+void place_groups(const ModelData& model, GroupState& groups, double* memory) noexcept;
 
 // Working memory of a step on the tree.
 struct TreeWork {
@@ -207,7 +204,7 @@ struct TreeWork {
     double* stage_effort[3] = {};  // of which these are those after the first
     double* auxiliary[4] = {};
 };
-int tree_work_size(const ModelData& model) noexcept;  // in doubles
+std::size_t tree_work_size(const ModelData& model) noexcept;  // in doubles
 void place_tree_work(const ModelData& model, TreeWork& work, double* memory) noexcept;
 
 // q and ψ from z.

@@ -1,3 +1,4 @@
+// One contact mode on the tree: groups, what joins them, what acts on them.
 #include <algorithm>
 #include <cmath>
 
@@ -8,73 +9,6 @@
 #include "plant/tree.h"
 
 namespace shiftrig::plant::detail {
-
-namespace {
-
-// Of one array by group or position: whole panels, so that each begins on a cache line.
-std::size_t stride(const ModelData& m) {
-    return static_cast<std::size_t>(whole_panels(m.masses + 1));
-}
-
-// Of one array by force or mesh.
-std::size_t pair_stride(const ModelData& m) {
-    return static_cast<std::size_t>(whole_panels(std::max(m.forces, m.meshes)));
-}
-
-}  // namespace
-
-TreeSizes::TreeSizes(const ModelData& m) {
-    const std::size_t n = stride(m);
-    const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
-    forces = 2 * static_cast<std::size_t>(m.forces);
-    const std::size_t pairs = pair_stride(m);
-    doubles = (20 + matrix_parts) * n + 6 * pairs +
-              static_cast<std::size_t>(whole_panels(static_cast<int>(grounds)));
-    integers = 19 * n + 2 * grounds + 7 * pairs;
-    bytes = (n + 7) / 8 * 8;
-    masses = n;
-    edges = n;
-}
-
-void place_tree(const ModelData& m, TreeMode& t, const TreeMemory& memory) noexcept {
-    double* doubles = memory.doubles;
-    int* integers = memory.integers;
-    const std::size_t n = stride(m);
-    const std::size_t grounds = m.tree->grounds.size() + static_cast<std::size_t>(m.meshes);
-    for (double** array :
-         {&t.ratio, &t.force_ratio, &t.mass, &t.inverse_mass, &t.drag, &t.stiffness, &t.damping, &t.loss,
-          &t.drag_loss, &t.edge_own, &t.edge_up, &t.network_inverse, &t.network_lower, &t.speed_factor,
-          &t.twist_factor, &t.mass_ratio, &t.shaft_ratio, &t.inside}) {
-        *array = doubles;
-        doubles += n;
-    }
-    t.end_factor = doubles;  // two ends of every link
-    place_matrix(t.matrix, t.end_factor + 2 * n, n);
-    const std::size_t pairs = pair_stride(m);
-    t.ground_factor = t.end_factor + (2 + matrix_parts) * n + 6 * pairs;
-    for (int** array :
-         {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.head, &t.run_begin,
-          &t.run_parent, &t.speed_slot, &t.twist_slot, &t.mass_group, &t.shaft_group, &t.up, &t.spent}) {
-        *array = integers;
-        integers += n;
-    }
-    t.end_group = integers;
-    t.end_position = t.end_group + 2 * n;
-    t.ground_position = t.end_position + 2 * n;
-    t.ground_unknown = t.ground_position + grounds;
-    t.force = t.ground_unknown + grounds;
-    double* pair_factor = t.end_factor + (2 + matrix_parts) * n;
-    int* pair_group = t.force + pairs;
-    for (GroupPairs* list : {&t.force_slip, &t.force_share, &t.turning}) {
-        *list = {pair_group, pair_group + pairs, pair_factor, pair_factor + pairs};
-        pair_group += 2 * pairs;
-        pair_factor += 2 * pairs;
-    }
-    t.grounded = memory.bytes;
-    t.inner = memory.masses;
-    t.inner_force = memory.forces;
-    t.inner_edge = memory.edges;
-}
 
 namespace {
 
@@ -306,15 +240,6 @@ void build_tree_mode(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     find_swing(m, t);
     t.matrix.weight = ark3_gamma * m.options.step_size;
     factor_stage(t, t.matrix);
-}
-
-void place_matrix(StageMatrix& matrix, double* memory, std::size_t stride) noexcept {
-    TreeScan &up = matrix.towards_roots, &down = matrix.towards_leaves;
-    for (double** part : {&matrix.inverse, &matrix.lower, &up.by_one, &up.by_two, &up.from_outside,
-                          &down.by_one, &down.by_two, &down.from_outside}) {
-        *part = memory;
-        memory += stride;
-    }
 }
 
 namespace {

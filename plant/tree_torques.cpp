@@ -11,12 +11,6 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-constexpr int margin = 8;  // a cache line: the inner loops may read one element beyond either end
-
-int stride(const ModelData& m) {
-    return whole_panels(m.masses + 1) + 2 * margin;
-}
-
 // Equilibrium inside the grounded groups: adds to the torques what the load leaves, takes it off the load.
 void solve_network(const ModelData& m, const TreeMode& t, double* load, double* potential, double* torque) {
     const TreeTopology& topology = *m.tree;
@@ -52,42 +46,6 @@ void solve_network(const ModelData& m, const TreeMode& t, double* load, double* 
 }
 
 }  // namespace
-
-int tree_work_size(const ModelData& m) noexcept {
-    return (11 + matrix_parts) * stride(m) + 3 * whole_panels(m.forces) + 4 * m.auxiliary;
-}
-
-void place_tree_work(const ModelData& m, TreeWork& work, double* memory) noexcept {
-    const auto take = [&, length = stride(m)] {
-        double* const at = memory + margin;
-        memory += length;
-        return at;
-    };
-    for (double** vector : {&work.momentum, &work.way, &work.load, &work.potential}) *vector = take();
-    for (double*& vector : work.speed) vector = take();
-    for (double*& vector : work.swing) vector = take();
-    place_matrix(work.matrix, memory, static_cast<std::size_t>(stride(m)));
-    memory += matrix_parts * stride(m);
-    const auto take_row = [&](int length) {
-        double* const at = memory;
-        memory += length;
-        return at;
-    };
-    for (double*& vector : work.stage_effort) vector = take_row(whole_panels(m.forces));
-    for (double*& vector : work.auxiliary) vector = take_row(m.auxiliary);
-}
-
-std::size_t group_state_size(const ModelData& m) {
-    return static_cast<std::size_t>(5 * stride(m));
-}
-
-void place_groups(const ModelData& m, GroupState& groups, double* memory) {
-    memory += margin;
-    for (double** vector : {&groups.speed, &groups.twist, &groups.rate, &groups.passed, &groups.net}) {
-        *vector = memory;
-        memory += stride(m);
-    }
-}
 
 void read_groups(const TreeMode& t, const double* z, GroupState& s) SHIFTRIG_REALTIME {
     const int groups = t.paths.groups;
