@@ -8,7 +8,8 @@
 
 namespace shiftrig::plant::detail {
 
-ContactTable::ContactTable(const ModelData& m) : contact(static_cast<std::size_t>(m.contact_bytes)) {
+ContactTable::ContactTable(const ModelData& m)
+    : contact(static_cast<std::size_t>(whole_words(m.contact_bytes))) {
     const int pairs = whole_panels(m.pairs), meshes = whole_panels(m.meshes);
     numbers = aligned_doubles(static_cast<std::size_t>(m.law_rows + 5 * pairs + 3 * meshes) + loop_slack);
     double* at = numbers.data()->value;
@@ -31,14 +32,14 @@ constexpr double state_codes[] = {0, 1, 1, 2};  // of PairState
 }  // namespace
 
 void tabulate_contact(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
     ContactTable& table = w.operators.table;
     if (table.known && table.viscosity == w.operators.oil.viscosity &&
-        same_bytes(table.contact.data(), w.contact, table.contact.size()))
+        same_states(table.contact.data(), w.contact, m.contact_bytes))
         return;
-    const ModelData& m = w.model;
     table.known = true;
     table.viscosity = w.operators.oil.viscosity;
-    std::copy(w.contact, w.contact + m.contact_bytes, table.contact.begin());
+    copy_states(w.contact, m.contact_bytes, table.contact.data());
     table.fades = table.acts = false;
     for (int k = 0; k < m.pairs; ++k) {
         const unsigned char state = w.contact[k];

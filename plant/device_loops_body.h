@@ -180,9 +180,10 @@ bool same(const double* a, const double* b, int count) SHIFTRIG_REALTIME {
     Marks different = {};
     for (; count >= lanes; count -= lanes, a += lanes, b += lanes)
         different |= reinterpret_cast<Marks>(read(a)) ^ reinterpret_cast<Marks>(read(b));
-    if (count > 0)
-        different |= first_of(count) & (reinterpret_cast<Marks>(read(a)) ^ reinterpret_cast<Marks>(read(b)));
-    return !any(different);
+    std::int64_t last = 0;  // these may be the end of their memory
+    for (int i = 0; i < count; ++i)
+        last |= __builtin_bit_cast(std::int64_t, a[i]) ^ __builtin_bit_cast(std::int64_t, b[i]);
+    return !any(different) && last == 0;
 }
 
 void copy(const double* from, int count, double* to) SHIFTRIG_REALTIME {

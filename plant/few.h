@@ -27,6 +27,23 @@ inline bool same_bits(const double* a, const double* b, int count) noexcept {
     return different == 0;
 }
 
+// Contact states, one byte each, in memory of whole words that ends in zeros.
+constexpr int whole_words(int bytes) noexcept {
+    return (bytes + 7) / 8 * 8;
+}
+inline bool same_states(const unsigned char* a, const unsigned char* b, int bytes) noexcept {
+    std::uint64_t different = 0, word_a, word_b;
+    for (int i = 0; i < bytes; i += 8) {
+        std::memcpy(&word_a, a + i, 8);
+        std::memcpy(&word_b, b + i, 8);
+        different |= word_a ^ word_b;
+    }
+    return different == 0;
+}
+inline void copy_states(const unsigned char* from, int bytes, unsigned char* to) noexcept {
+    for (int i = 0; i < bytes; i += 8) std::memcpy(to + i, from + i, 8);
+}
+
 inline bool same_bytes(const void* a, const void* b, std::size_t count) noexcept {
     return count == 0 || std::memcmp(a, b, count) == 0;  // of none there may be no address
 }

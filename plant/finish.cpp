@@ -43,7 +43,8 @@ bool is_carried(const ModelData& m, const OperatorsData& o, const double* block)
     // The step ended with the table up to date.
     return same_state(m, s.z, block + at.speeds) &&
            same_bits(s.auxiliary, block + at.auxiliary, m.auxiliary) &&
-           same_bytes(o.table.contact.data(), block + at.contact, o.table.contact.size()) &&
+           same_states(o.table.contact.data(), reinterpret_cast<const unsigned char*>(block + at.contact),
+                       m.contact_bytes) &&
            same_bits(o.carried_engines.data(), block + at.engines, 3 * static_cast<int>(m.engines.size()));
 }
 
@@ -220,7 +221,7 @@ Work begin_step(const ModelData& m, OperatorsData& operators, State& state, Outp
         load_sample(m, block, time, scratch.begin());
         scratch.stored_before = stored_energy(m, scratch.begin().z, contact);
     }
-    std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
+    copy_states(contact, m.contact_bytes, scratch.before.data());
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
         scratch.engine_modes[e] =
             static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
@@ -252,7 +253,7 @@ Work begin_look(const ModelData& m, OperatorsData& operators, const State& state
     scratch.last = &operators.samples[1 - operators.first];
     operators.carried = false;
     load_sample(m, block, time, scratch.begin());
-    std::copy(contact, contact + m.contact_bytes, scratch.before.begin());
+    copy_states(contact, m.contact_bytes, scratch.before.data());
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
         scratch.engine_modes[e] =
             static_cast<EngineMode>(static_cast<int>(block[m.layout.engines + 3 * static_cast<int>(e)]));
@@ -273,6 +274,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     double* block = w.next;
     Certificate& certificate = w.outputs.certificate;
 
+    for (int k = 0; k < m.pairs; ++k) block[layout.heat + k] += s.work[k];
     tabulate_contact(w, mode);
     advance_sensors(w, s.begin().z);
     write_integer(block, read_integer(block) + 1);
@@ -280,7 +282,6 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     copy_few(s.begin().auxiliary, m.auxiliary, block + layout.auxiliary);
     advance_engine_modes(w);
     advance_temperatures(w);
-    for (int k = 0; k < m.pairs; ++k) block[layout.heat + k] += s.work[k];
     block[layout.energy] += s.input_work;
     block[layout.energy + 1] += s.dissipated;
 

@@ -112,8 +112,8 @@ void bearing_forces(const Work& w, const unsigned char* contact, Sample& s) noex
 void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     OperatorsData& known = w.operators;
-    const std::size_t bytes = known.raw_input.size() * sizeof(double);
-    if (known.inputs_known && same_bytes(known.raw_input.data(), inputs.value.data(), bytes)) return;
+    const auto count = static_cast<int>(known.raw_input.size());
+    if (known.inputs_known && m.kernel.loops.same(known.raw_input.data(), inputs.value.data(), count)) return;
     std::copy(inputs.value.begin(), inputs.value.end(), known.raw_input.begin());
     known.inputs_known = true;
     known.carried = false;

@@ -50,7 +50,7 @@ OperatorsData::OperatorsData(const ModelData& m) {
         modes[i].relations = relation_memory.data() + i * relations;
     }
     wanted.assign(key_bytes, 0);
-    recent_contact.assign(static_cast<std::size_t>(m.contact_bytes), 0);
+    recent_contact.assign(static_cast<std::size_t>(whole_words(m.contact_bytes)), 0);
     hashes.assign(modes.size(), 0);
     raw_input.assign(m.inputs.size(), 0.);
     input.assign(m.inputs.size(), 0.);
@@ -112,15 +112,14 @@ void OperatorsData::place_trees(const ModelData& m) {
 
 Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* contact,
                 ScratchData& scratch) SHIFTRIG_REALTIME {
-    const auto contact_bytes = static_cast<std::size_t>(m.contact_bytes);
     const auto found = [&](Mode& mode) -> Mode& {
         mode.last_use = ++o.clock;
         o.recent = &mode;
         if (contact != scratch.trial.data()) o.in_force = &mode;
         return mode;
     };
-    if (o.recent && same_bytes(o.recent_contact.data(), contact, contact_bytes)) return found(*o.recent);
-    std::copy(contact, contact + contact_bytes, o.recent_contact.begin());
+    if (o.recent && same_states(o.recent_contact.data(), contact, m.contact_bytes)) return found(*o.recent);
+    copy_states(contact, m.contact_bytes, o.recent_contact.data());
     mode_key(m, contact, o.wanted.data());
     const std::size_t bytes = o.wanted.size();
     if (o.recent && same_bytes(o.recent->key, o.wanted.data(), bytes)) return found(*o.recent);

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "plant/few.h"
 #include "plant/modes.h"
 #include "plant/rest_problem.h"
 
@@ -61,7 +62,7 @@ ScratchData::ScratchData(const ModelData& m) {
     for (auto* list : {&moving, &busy}) list->assign(static_cast<std::size_t>(m.pairs), 0);
     moves.assign(static_cast<std::size_t>(m.pairs), 0);
     engine_modes.resize(m.engines.size());
-    const auto bytes = static_cast<std::size_t>(m.contact_bytes);
+    const auto bytes = static_cast<std::size_t>(whole_words(m.contact_bytes));
     for (auto* list : {&before, &trial, &release, &changed, &violations}) list->assign(bytes, 0);
     family.assign(bytes, 0);
     overcome.assign(static_cast<std::size_t>(m.pairs), 0);

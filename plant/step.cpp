@@ -5,6 +5,7 @@
 #include "plant/ark3.h"
 #include "plant/contact_table.h"
 #include "plant/etd3.h"
+#include "plant/few.h"
 #include "plant/finish.h"
 #include "plant/flanks.h"
 #include "plant/forces.h"
@@ -53,7 +54,7 @@ Mode& begin_mode(Work& w) SHIFTRIG_REALTIME {
     const bool settled = begun && s.moving_count == 0;
     Mode& mode = settled ? find_mode(w.model, w.operators, w.contact, s) : settle(w, s.begin(), begun);
     // What it takes to find nothing to do is not counted: it depends on whether the last step is remembered.
-    if (std::equal(w.contact, w.contact + w.model.contact_bytes, s.before.begin()))
+    if (same_states(w.contact, s.before.data(), w.model.contact_bytes))
         w.outputs.certificate.mode_lookups = 1;
     return mode;
 }
