@@ -43,7 +43,8 @@ constexpr double embedded_error[stages] = {
     weights[0] - 2756255671327. / 12835298489170, weights[1] + 10771552573575. / 22201958757719,
     weights[2] - 9247589265047. / 10645013368117, gamma - 2193209047091. / 5459859503100};
 
-// A change of momentum as M Σ speed_j q_j + net · h (N_0 + Q_0) + Σ effort_j · h Q_j.
+// A momentum as M (speed_0 q_0 + Σ_{j>0} speed_j (q_j − q_0)) + net · h (N_0 + Q_0) + Σ effort_j · h Q_j. In differences, since
+// what turns at constant speed is then to keep it to the last bit, in 10⁸ steps as in one.
 struct Impulse {
     double speed[stages] = {}, net = 0, effort[stages] = {};
     constexpr void add(double factor, const Impulse& other) {
@@ -69,7 +70,7 @@ constexpr Impulses work_out_stages() {
             star.add(implicit_table[i][j], all.torque[j]);
             star.effort[j] += explicit_table[i][j];
         }
-        all.torque[i].speed[i] = 1 / gamma;
+        all.torque[i].speed[0] = all.torque[i].speed[i] = 1 / gamma;
         all.torque[i].add(-1 / gamma, star);
     }
     return all;

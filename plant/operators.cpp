@@ -71,7 +71,7 @@ OperatorsData::OperatorsData(const ModelData& m) {
 
 void OperatorsData::place_matrices(const ModelData& m) {
     const ModeSizes sizes(m);
-    const auto per_mode = static_cast<std::size_t>(sizes.doubles() + 8 * panel_rows);
+    const auto per_mode = static_cast<std::size_t>(sizes.doubles()) + std::size_t{8} * panel_rows;
     const auto affordable = static_cast<int>(memory_budget / (8 * per_mode + 1));
     modes.resize(static_cast<std::size_t>(std::clamp(affordable, fewest_modes, most_modes)));
     memory = aligned_doubles(modes.size() * per_mode);
@@ -130,9 +130,9 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
             continue;
         return found(mode);
     }
-    Mode* oldest = nullptr;
+    Mode* oldest = &o.modes[&o.modes[0] == o.in_force ? 1 : 0];  // there are more than two
     for (Mode& mode : o.modes) {
-        if (&mode != o.in_force && (!oldest || mode.last_use < oldest->last_use)) oldest = &mode;
+        if (&mode != o.in_force && mode.last_use < oldest->last_use) oldest = &mode;
     }
     o.hashes[static_cast<std::size_t>(oldest - o.modes.data())] = hash;
     ++o.misses;

@@ -35,7 +35,7 @@ void place_sample(const ModelData& m, Sample& s, double* memory) {
     s.swing = s.turning + m.meshes;
     s.z = s.slip + m.power_rows;
     s.rate = take(static_cast<std::size_t>(whole_panels(m.states_padded)));
-    s.f = take(static_cast<std::size_t>(m.states + m.forces)) + m.states;
+    s.f = take(static_cast<std::size_t>(m.columns)) + m.states;
     s.active =
         take(static_cast<std::size_t>(whole_panels(m.torques + static_cast<int>(m.translating.size()))));
     s.auxiliary = take(auxiliary);

@@ -166,7 +166,7 @@ State::State(const Model& model) {
         if (m.structure.pairs[static_cast<std::size_t>(k)].initially_locked) locked.push_back(k);
     }
     const Eigen::VectorXd speeds = compatible_speeds(m, wanted, locked, false, {});
-    for (int j = 0; j < m.masses; ++j) block[static_cast<std::size_t>(m.layout.speeds + j)] = speeds(j);
+    std::copy(speeds.begin(), speeds.end(), block.data() + m.layout.speeds);
     double* twist = block.data() + m.layout.twists;
     for (const Elastic& shaft : m.structure.shafts) *twist++ = shaft.initial_twist;
     initialise(m, block.data(), Inputs(model).value, locked);
@@ -227,7 +227,7 @@ void start(const Model& model, State& state, const Start& start, const Inputs& i
     }
     std::fill(state.block.begin() + detail::StateLayout::header, state.block.end(), 0.);
     detail::write_integer(&state.block[0], 0);
-    for (int j = 0; j < m.masses; ++j) state.block[static_cast<std::size_t>(m.layout.speeds + j)] = speeds(j);
+    std::copy(speeds.begin(), speeds.end(), state.block.data() + m.layout.speeds);
     initialise(m, state.block.data(), inputs.value, locked);
 }
 

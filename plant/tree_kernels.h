@@ -37,8 +37,8 @@ struct TreePaths {
 using ShaftTorques = void (*)(const TreePaths&, const double* speed, const double* twist, double* rate,
                               double* passed, double* torque) SHIFTRIG_REALTIME;
 
-// What the speeds of the stages so far make of momenta, M Σ of_momentum_j q_j + of_net · net, and of the ways that groups
-// turn, Σ of_way_j q_j.
+// What the speeds of the stages so far make of momenta, M (of_momentum_0 q_0 + Σ of_momentum_j (q_j − q_0)) + of_net · net, and
+// of the ways that groups turn, Σ of_way_j q_j.
 struct StageSums {
     int count = 0;
     const double* speed[4] = {};

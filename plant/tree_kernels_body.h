@@ -30,10 +30,10 @@ inline Block all(double value) noexcept {
 
 // The last numbers of one block and all but the last of the next: each group's parent inside a path.
 inline Block one_before(const Block& last, const Block& here) noexcept {
-    return __builtin_shuffle(last, here, Lanes{3, 4, 5, 6});
+    return __builtin_shufflevector(last, here, 3, 4, 5, 6);
 }
 inline Block one_behind(const Block& here, const Block& next) noexcept {
-    return __builtin_shuffle(here, next, Lanes{1, 2, 3, 4});
+    return __builtin_shufflevector(here, next, 1, 2, 3, 4);
 }
 
 // 0 from this group on.
@@ -116,17 +116,18 @@ void combine_speeds(const TreePaths& t, const StageSums& s, double* __restrict m
     const double* __restrict mass = t.mass, * __restrict net = s.net;
     const int groups = t.groups;
     for (int g = 0; g < groups; ++g) {
-        double p = m0 * q0[g], turned = w0 * q0[g];
+        const double q = q0[g];
+        double p = m0 * q, turned = w0 * q;
         if constexpr (count > 1) {
-            p = SHIFTRIG_FMA(m1, q1[g], p);
+            p = SHIFTRIG_FMA(m1, q1[g] - q, p);
             turned = SHIFTRIG_FMA(w1, q1[g], turned);
         }
         if constexpr (count > 2) {
-            p = SHIFTRIG_FMA(m2, q2[g], p);
+            p = SHIFTRIG_FMA(m2, q2[g] - q, p);
             turned = SHIFTRIG_FMA(w2, q2[g], turned);
         }
         if constexpr (count > 3) {
-            p = SHIFTRIG_FMA(m3, q3[g], p);
+            p = SHIFTRIG_FMA(m3, q3[g] - q, p);
             turned = SHIFTRIG_FMA(w3, q3[g], turned);
         }
         momentum[g] = SHIFTRIG_FMA(mass[g], p, of_net * net[g]);
@@ -146,13 +147,13 @@ void combine(const TreePaths& t, const StageSums& s, double* momentum, double* w
 // and only what one block hands on to the next is a chain: TreeScan says what of a block's values goes on to which.
 // Shifted by one and by two; those at the end come round, and their factors are 0.
 inline Block from_below(const Block& v) noexcept {
-    return __builtin_shuffle(v, Lanes{3, 0, 1, 2});
+    return __builtin_shufflevector(v, v, 3, 0, 1, 2);
 }
 inline Block from_above(const Block& v) noexcept {
-    return __builtin_shuffle(v, Lanes{1, 2, 3, 0});
+    return __builtin_shufflevector(v, v, 1, 2, 3, 0);
 }
 inline Block by_two(const Block& v) noexcept {
-    return __builtin_shuffle(v, Lanes{2, 3, 0, 1});
+    return __builtin_shufflevector(v, v, 2, 3, 0, 1);
 }
 
 // Leaves towards roots: b of the parent += L b.

@@ -111,7 +111,7 @@ void place_tree_work(const ModelData& m, TreeWork& work, double* memory) noexcep
 }
 
 std::size_t group_state_size(const ModelData& m) noexcept {
-    return static_cast<std::size_t>(5 * step_stride(m));
+    return std::size_t{5} * static_cast<std::size_t>(step_stride(m));
 }
 
 void place_groups(const ModelData& m, GroupState& groups, double* memory) noexcept {

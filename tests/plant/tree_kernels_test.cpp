@@ -192,7 +192,7 @@ TEST_P(TreeKernelsOf, CombineAndFinishStages) {
             for (int g = 0; g < n; ++g) {
                 double p = 1e-3 * net[g], turned = 0;
                 for (int j = 0; j < count; ++j) {
-                    p += tree.mass[g] * sums.of_momentum[j] * q[j][g];
+                    p += tree.mass[g] * sums.of_momentum[j] * (j == 0 ? q[0][g] : q[j][g] - q[0][g]);
                     turned += sums.of_way[j] * q[j][g];
                 }
                 EXPECT_NEAR(momentum[g], p, 1e-12 * 400);
