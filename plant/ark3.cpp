@@ -43,8 +43,8 @@ constexpr double embedded_error[stages] = {
     weights[0] - 2756255671327. / 12835298489170, weights[1] + 10771552573575. / 22201958757719,
     weights[2] - 9247589265047. / 10645013368117, gamma - 2193209047091. / 5459859503100};
 
-// A momentum as M (speed_0 q_0 + Σ_{j>0} speed_j (q_j − q_0)) + net · h (N_0 + Q_0) + Σ effort_j · h Q_j. In differences, since
-// what turns at constant speed is then to keep it to the last bit, in 10⁸ steps as in one.
+// A momentum as M (speed_0 q_0 + Σ_{j>0} speed_j (q_j − q_0)) + net · h (N_0 + Q_0) + Σ effort_j · h Q_j. In differences:
+// what all stages turn at is then weighed by exactly 1, in 10⁸ steps as in one.
 struct Impulse {
     double speed[stages] = {}, net = 0, effort[stages] = {};
     constexpr void add(double factor, const Impulse& other) {
