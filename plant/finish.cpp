@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "plant/devices.h"
 #include "plant/few.h"
 #include "plant/laws/sensor.h"
 #include "plant/ledger.h"
@@ -46,6 +47,20 @@ bool is_carried(const ModelData& m, const OperatorsData& o, const double* block)
            same_states(o.table.contact.data(), reinterpret_cast<const unsigned char*>(block + at.contact),
                        m.contact_bytes) &&
            same_bits(o.carried_engines.data(), block + at.engines, 3 * static_cast<int>(m.engines.size()));
+}
+
+// Would settling turn the loss of a mesh that others hold? Of meshes in motion the step has seen to that.
+bool turns_at_rest(const Work& w, const Sample& s) {
+    double size = -1;
+    for (const int k : w.model.lossy_meshes) {
+        const unsigned char state = w.contact[w.model.pairs + k];
+        if (state == stuck) continue;
+        const double sign = motion_sign(state), torque = s.torque[w.model.pairs + k] - loss_kink(w, k, sign);
+        if ((torque * sign < 0 ? -1 : 1) == loss_exponent(state)) continue;
+        if (size < 0) size = 1e-9 * torque_scale(w, s);
+        if (std::fabs(torque) > size) return true;
+    }
+    return false;
 }
 
 void reset(Outputs& outputs, ScratchData& scratch, int forces) {
@@ -98,6 +113,7 @@ void advance_engine_modes(Work& w) {
                 next == EngineMode::stalled ? EventKind::engine_stalls : EventKind::engine_starts;
             log_event(w, kind, device, w.start + w.h, state[0], 0, speed);
         }
+        if (next != mode) w.scratch.carries = false;  // another law from now on
         if (next != EngineMode::running) state[0] = state[1] = 0;
         at[0] = static_cast<double>(static_cast<int>(next));
         at[2] = start;
@@ -296,7 +312,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
 
     OperatorsData& o = w.operators;
     o.first = static_cast<int>(s.first - o.samples);
-    o.carried = s.carries;
+    o.carried = s.carries && !(mode.rests && turns_at_rest(w, s.begin()));
     o.carried_energy = s.stored;
     copy_few(block + layout.engines, 3 * static_cast<int>(m.engines.size()), o.carried_engines.data());
 }

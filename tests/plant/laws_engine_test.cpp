@@ -168,5 +168,42 @@ TEST(EngineInAMachine, BuildsUpItsBoostWhetherItCanStallOrNot) {
     }
 }
 
+// Its law changes with its mode at the end of a step: what the step has just computed does not hold for the next one.
+TEST(EngineInAMachine, StartsAndStallsTheSameWhetherTheLastStepIsRememberedOrNot) {
+    Engine engine = reference_engine();
+    engine.name = "diesel";
+    engine.mass = "crank";
+    Description d;
+    d.name = "engine";
+    d.masses = {{"crank", 2.6, Motion::rotating, 0}};
+    d.engines = {engine};
+    TorqueSource load;
+    load.name = "load";
+    load.mass = "crank";
+    load.input = true;
+    d.sources = {load};
+    const Model model = Model::build(d);
+    Operators kept(model), dropped(model);
+    State state(model), again(model);
+    Scratch scratch(model);
+    Inputs inputs(model);
+    Outputs outputs(model);
+    bool ran = false, stalled = false;
+    for (int n = 0; n < 6000; ++n) {
+        inputs.value[static_cast<std::size_t>(model.input("engine.diesel.start"))] = n > 50 ? 1 : 0;
+        inputs.value[static_cast<std::size_t>(model.input("source.load.torque"))] = n > 3000 ? -1500 : 0;
+        dropped.drop();
+        step(model, dropped, again, inputs, outputs, scratch);
+        step(model, kept, state, inputs, outputs, scratch);
+        ASSERT_EQ(state.block, again.block) << "step " << n;
+        const double speed = state.speeds()[0];
+        ran = ran || speed > 800 * rpm;
+        stalled = stalled ||
+                  (ran && outputs.value[static_cast<std::size_t>(model.output("engine.diesel.stalled"))] > 0);
+    }
+    EXPECT_TRUE(ran);
+    EXPECT_TRUE(stalled);
+}
+
 }  // namespace
 }  // namespace shiftrig::plant
