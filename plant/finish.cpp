@@ -63,6 +63,14 @@ bool turns_at_rest(const Work& w, const Sample& s) {
     return false;
 }
 
+// Would settling let a pair go that nothing presses any more, or engage one?
+bool engages_or_releases(const Work& w, const Sample& s) {
+    bool found = false;
+    for (int k = 0; k < w.model.pairs; ++k)
+        found |= (s.sliding[k] > 0 || s.holding[k] > 0) == (w.contact[k] == free_running);
+    return found;
+}
+
 void reset(Outputs& outputs, ScratchData& scratch, int forces) {
     outputs.certificate = {};
     outputs.event_count = 0;
@@ -312,7 +320,8 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
 
     OperatorsData& o = w.operators;
     o.first = static_cast<int>(s.first - o.samples);
-    o.carried = s.carries && !(mode.rests && turns_at_rest(w, s.begin()));
+    o.carried =
+        s.carries && !engages_or_releases(w, s.begin()) && !(mode.rests && turns_at_rest(w, s.begin()));
     o.carried_energy = s.stored;
     copy_few(block + layout.engines, 3 * static_cast<int>(m.engines.size()), o.carried_engines.data());
 }
