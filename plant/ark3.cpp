@@ -11,9 +11,7 @@
 #include "plant/ark3.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "plant/contact.h"
 #include "plant/devices.h"
 #include "plant/few.h"
 #include "plant/modes.h"
@@ -92,7 +90,7 @@ constexpr double coefficient(const double (&row)[stages], int power) {
     for (int i = 0; i < stages; ++i) sum += row[i] * vector[i];
     return sum;
 }
-// The step has (hL)⁴ in excess by the first: so it damps a swing by the ratio 0.026 (hω)³ (numerics.md §6). The embedded
+// The step has (hL)⁴ in excess by the first: so it damps a swing by the ratio 0.026 (hω)³ (docs/mechanics.md, One step). The embedded
 // method differs by e = the second times (hL)³, and because the stages are of order 2, forces that change with time
 // enter both alike. So −(first/second) hL e takes the excess away.
 constexpr double excess = coefficient(weights, 3) - 1. / 24, embedded = coefficient(embedded_error, 2);
@@ -171,7 +169,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     const GroupState& start = groups_of(w, mode, begin);
     v.effort[0] = begin.f;
     Sample& late = s.late;  // of each stage in turn, its f kept
-    copy_few(begin.auxiliary_rate, m.auxiliary, v.auxiliary[0]);
+    copy_few(begin.auxiliary_rate, m.auxiliary, v.auxiliary_rate[0]);
     for (int i = 1; i < stages; ++i) {
         kernel.combine(t.paths, stage_sums(impulses.star[i], implicit_table[i], i, start, v, h), v.momentum,
                        v.way);
@@ -184,13 +182,13 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
         late.at = {w.start + fraction * w.h, fraction, last ? Side::left : Side::right};
         for (int a = 0; a < m.auxiliary; ++a) {
             double change = 0;
-            for (int j = 0; j < i; ++j) change += explicit_table[i][j] * v.auxiliary[j][a];
+            for (int j = 0; j < i; ++j) change += explicit_table[i][j] * v.auxiliary_rate[j][a];
             late.auxiliary[a] = begin.auxiliary[a] + h * change;
         }
         group_slips(m, mode, speed, late);
         v.effort[i] = late.f = v.stage_effort[i - 1];
         stage_forces(w, late);
-        copy_few(late.auxiliary_rate, m.auxiliary, v.auxiliary[i]);
+        copy_few(late.auxiliary_rate, m.auxiliary, v.auxiliary_rate[i]);
     }
 
     // The implicit table ends with b: the last stage needs only what its explicit part lacks.
@@ -203,7 +201,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     if (t.swings) complete_swing(m, t, v, h, matrix, start, groups);
     for (int a = 0; a < m.auxiliary; ++a) {
         double change = 0;
-        for (int j = 0; j < stages; ++j) change += weights[j] * v.auxiliary[j][a];
+        for (int j = 0; j < stages; ++j) change += weights[j] * v.auxiliary_rate[j][a];
         end.auxiliary[a] = begin.auxiliary[a] + h * change;
     }
     kernel.spread(t.mass_group, t.mass_ratio, groups.speed, m.masses, end.z);
@@ -213,7 +211,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};
     end_forces(w, end);
     complete_groups(w, mode, end);
-    s.torque_residual = rigid_torques(w, mode, end);
+    rigid_torques(w, mode, end);
     const double middle = 0.5 * (from + end_fraction);
     s.half.at = {w.start + middle * w.h, middle, Side::right};
 }

@@ -1,6 +1,5 @@
 #include "plant/contact_table.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "plant/devices.h"
@@ -53,7 +52,7 @@ void tabulate_contact(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         table.base[k] = tabled ? 0 : slides ? friction.base : m.sliding_at_rest[i];
         table.rise[k] = tabled || !fades ? 0 : friction.rise;
         table.inverse_speed[k] = friction.inverse_speed;
-        table.acts = table.acts || table.sense[k] != 0 || table.drag[k] != 0;
+        table.acts = table.acts || (k < m.actuated_pairs && (table.sense[k] != 0 || table.drag[k] != 0));
         table.fades = table.fades || (k < m.actuated_pairs && table.rise[k] != 0);
         table.state_code[k] = state_codes[state];
     }

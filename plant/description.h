@@ -95,7 +95,7 @@ struct Description {
 
     Transition transition = Transition::localised;
     Method method = Method::automatic;
-    int maximum_events = 4;  // K of numerics.md §4
+    int maximum_events = 4;  // K: located in one step
     // A step is taken in up to this many parts where shafts swing or forces change too fast for one; 1: never.
     // Bounds the cost of a step. A backlash whose flanks are too stiff for that many raises both bounds, friction that rises
     // too steeply over the slip the second, to 256 at most (not 1).

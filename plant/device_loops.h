@@ -1,6 +1,6 @@
 // The loops of an ordinary step over all devices side by side, without a branch per device: do all states hold, may a
-// margin have dipped, what the open clutches drag, what the ledger books, temperatures, pick-ups. Compiled for each
-// kernel like its products (device_loops_body.h), so that as many devices go at once as a register holds.
+// margin have dipped, what pairs drag and pass on, what the ledger books, temperatures, pick-ups, what is shown. Compiled for
+// each kernel like its products (device_loops_body.h), so that as many devices go at once as a register holds.
 //
 // Arrays are read and written in whole registers: behind their last entry up to `loop_slack` more doubles must belong to
 // the same memory. What stands there does not matter, and what is written there is of no meaning.

@@ -3,23 +3,8 @@
 //
 // Comparisons are written so that what is not a number counts as no violation, and what stands behind an array as nothing.
 
-using Lanes = double __attribute__((vector_size(8 * lanes)));
-using Marks = std::int64_t __attribute__((vector_size(8 * lanes)));
+#include "plant/lanes_body.h"
 
-inline Lanes read(const double* p) noexcept {
-    Lanes v;
-    __builtin_memcpy(&v, p, sizeof v);
-    return v;
-}
-inline void write(double* p, const Lanes& v) noexcept {
-    __builtin_memcpy(p, &v, sizeof v);
-}
-inline Lanes magnitude(const Lanes& v) noexcept {
-    return reinterpret_cast<Lanes>(reinterpret_cast<Marks>(v) & INT64_MAX);
-}
-inline Lanes where(const Marks& marks, const Lanes& v) noexcept {  // 0 elsewhere
-    return reinterpret_cast<Lanes>(reinterpret_cast<Marks>(v) & marks);
-}
 inline bool any(const Marks& marks) noexcept {
     std::int64_t all = 0;
     for (int i = 0; i < lanes; ++i) all |= marks[i];
@@ -32,15 +17,8 @@ inline double sum(const Lanes& v) noexcept {
 }
 // The largest whole numbers not above v, |v| < 2^51.
 inline Lanes whole_below(const Lanes& v) noexcept {
-    constexpr double shift = 0x1.8p52;
-    const Lanes nearest = (v + shift) - shift;
+    const Lanes nearest = (v + nearest_shift) - nearest_shift;
     return nearest > v ? nearest - 1. : nearest;
-}
-
-inline Lanes gather(const double* from, const int* index) noexcept {
-    Lanes v;
-    for (int i = 0; i < lanes; ++i) v[i] = from[index[i]];
-    return v;
 }
 
 bool senses_hold(const SpeedCheck& c) SHIFTRIG_REALTIME {
@@ -63,25 +41,16 @@ bool may_dip(const SpeedCheck& c) SHIFTRIG_REALTIME {
 
 // math/elementary.h's, bit for bit, of what is not above 0.
 inline Lanes exp_below(const Lanes& x) noexcept {
-    constexpr double least = -745.2, inverse_ln2 = 0x1.71547652b82fep0, shift = 0x1.8p52;
-    constexpr double ln2_high = 0x1.62e42fefa38p-1, ln2_low = 0x1.ef35793c7673p-45;
-    const Lanes all = Lanes{} + least, bounded = x < all ? all : x;
-    const Lanes shifted = bounded * inverse_ln2 + shift, k = shifted - shift;
-    const Lanes high = bounded - k * ln2_high, low = k * ln2_low;
-    const Lanes r = high - low, r2 = r * r, r4 = r2 * r2;
-    const Lanes p0 = (1.0 / 2 + r * (1.0 / 6)) + r2 * (1.0 / 24 + r * (1.0 / 120));
-    const Lanes p1 = (1.0 / 720 + r * (1.0 / 5040)) + r2 * (1.0 / 40320 + r * (1.0 / 362880));
-    const Lanes p2 =
-        (1.0 / 3628800 + r * (1.0 / 39916800)) + r2 * (1.0 / 479001600 + r * (1.0 / 6227020800.0));
-    const Lanes p = p0 + r4 * (p1 + r4 * p2);
-    const Lanes e = 1. + (high - (low - r2 * p));
+    const Lanes least = Lanes{} - 745.2, bounded = x < least ? least : x;
+    const Lanes shifted = bounded * exp_inverse_ln2 + nearest_shift, k = shifted - nearest_shift;
+    const Lanes e = exp_remainder(bounded, k);
     // In two factors, of which the first rounds nothing: the result may be subnormal.
-    const Marks n = reinterpret_cast<Marks>(shifted) - reinterpret_cast<Marks>(Lanes{} + shift);
+    const Marks n = reinterpret_cast<Marks>(shifted) - reinterpret_cast<Marks>(Lanes{} + nearest_shift);
     const Marks half = n >> 1;
     const auto power_of_two = [](const Marks& exponent) {
         return reinterpret_cast<Lanes>((exponent + 1023) << 52);
     };
-    return where(~(x < all), e * power_of_two(half) * power_of_two(n - half));
+    return where(~(x < least), e * power_of_two(half) * power_of_two(n - half));
 }
 
 template <bool complete>
@@ -136,15 +105,6 @@ Work3 book(const PowerTerms& t, double h, double* work) SHIFTRIG_REALTIME {
 
 void subtract(const double* a, const double* b, int count, double* difference) SHIFTRIG_REALTIME {
     for (int i = 0; i < count; i += lanes) write(difference + i, read(a + i) - read(b + i));
-}
-
-// Read from 8 − n on, marks for the first n.
-alignas(64) constexpr std::int64_t first_marks[16] = {-1, -1, -1, -1, -1, -1, -1, -1};
-
-inline Marks first_of(int count) noexcept {
-    Marks counted;
-    __builtin_memcpy(&counted, first_marks + 8 - (count < lanes ? count : lanes), sizeof counted);
-    return counted;
 }
 
 inline double square(const double* v, int count) noexcept {

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include "plant/devices.h"
 #include "plant/few.h"
 #include "plant/laws/sensor.h"
 #include "plant/ledger.h"
+#include "plant/stuck_meshes.h"
 #include "plant/transitions.h"
 
 namespace shiftrig::plant::detail {
@@ -59,6 +59,15 @@ bool turns_at_rest(const Work& w, const Sample& s) {
         if ((torque * sign < 0 ? -1 : 1) == loss_exponent(state)) continue;
         if (size < 0) size = 1e-9 * torque_scale(w, s);
         if (std::fabs(torque) > size) return true;
+    }
+    return false;
+}
+
+// Would it find one at rest beyond what its loss can be?
+bool goes_beyond_loss(const Work& w, const Mode& mode, const Sample& s) {
+    for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= w.model.pairs + w.model.meshes; --r) {
+        const double left = loss_left(w, mode.rows[r] - w.model.pairs - w.model.meshes, s);
+        if (left < 0 && left < -1e-9 * torque_scale(w, s)) return true;
     }
     return false;
 }
@@ -178,6 +187,7 @@ void advance_sensors(Work& w, const double* end_speeds) {
 // Residual of [Algin] eq. (15) at the sample, as a length, relative to that of all torques in it.
 double torque_residual(Work& w, const Mode& mode, const Sample& s) {
     const ModelData& m = w.model;
+    if (mode.tree) return s.torque_residual;
     if (mode.row_count == 0) return 0;
     double* const rest = w.scratch.vector_a;
     // q, f, M stand side by side.
@@ -311,7 +321,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
 
     s.stored = stored_energy(m, s.begin().z, w.contact);
     certificate.energy_defect = s.stored - s.stored_before - s.input_work + s.dissipated;
-    certificate.torque_residual = mode.tree ? s.torque_residual : torque_residual(w, mode, s.begin());
+    certificate.torque_residual = torque_residual(w, mode, s.begin());
     certificate.constraint_violation = constraint_violation(mode, s.begin().z);
     certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     if (!std::isfinite(s.stored)) certificate.flags |= 4;  // a sum over every speed and twist
@@ -320,8 +330,8 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
 
     OperatorsData& o = w.operators;
     o.first = static_cast<int>(s.first - o.samples);
-    o.carried =
-        s.carries && !engages_or_releases(w, s.begin()) && !(mode.rests && turns_at_rest(w, s.begin()));
+    o.carried = s.carries && !engages_or_releases(w, s.begin()) &&
+                !(mode.rests && (turns_at_rest(w, s.begin()) || goes_beyond_loss(w, mode, s.begin())));
     o.carried_energy = s.stored;
     copy_few(block + layout.engines, 3 * static_cast<int>(m.engines.size()), o.carried_engines.data());
 }
@@ -330,8 +340,7 @@ void finish_look(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     Sample& s = w.scratch.begin();
     tabulate_contact(w, mode);
     w.outputs.certificate.constraint_violation = constraint_violation(mode, s.z);
-    w.outputs.certificate.torque_residual =
-        mode.tree ? w.scratch.torque_residual : torque_residual(w, mode, s);
+    w.outputs.certificate.torque_residual = torque_residual(w, mode, s);
     w.outputs.certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     w.outputs.event_count = 0;
     w.scratch.stored = stored_energy(w.model, s.z, w.contact);

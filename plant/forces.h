@@ -48,7 +48,8 @@ bool is_pressed(const Work& work, int pair, const Instant& at) SHIFTRIG_REALTIME
 void evaluate_forces(const Work& work, const unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;
 
 // The same for the contact states in force, once tabulate_contact() has looked at them. While a part of a step is under
-// way, where nobody asks what pairs could hold or pass: forces f and auxiliary rates alone.
+// way, where nobody asks what pairs could hold or pass: forces f and auxiliary rates alone. Loads of
+// actuated pairs stand in the sample only where some move, or there are tables or one-way pairs.
 void stage_forces(const Work& work, Sample& sample) SHIFTRIG_REALTIME;
 // At the end of a part: all of it, bit for bit what evaluate_forces() gives.
 void end_forces(const Work& work, Sample& sample) SHIFTRIG_REALTIME;

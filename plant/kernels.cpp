@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "plant/math/elementary.h"
+
 namespace shiftrig::plant::detail {
 namespace {
 

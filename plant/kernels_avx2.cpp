@@ -1,5 +1,6 @@
 // Compiled with -mavx2 -mfma and run only where the processor has both.
 #include "plant/kernels.h"
+#include "plant/math/elementary.h"
 
 #if defined(SHIFTRIG_X86_KERNELS)
 #include <immintrin.h>

@@ -156,7 +156,8 @@ struct ModelData {
     std::vector<BacklashLaw> backlashes;
     std::vector<int> hydraulic_pairs, pedal_pairs, waveform_pairs;  // by what actuates them
     std::vector<int> heated_pairs;
-    int actuated_pairs = 0;  // pairs before those that are loaded by nature (rolling, resistance, engine)
+    int actuated_pairs =
+        0;  // pairs before those that are loaded by nature (rolling, resistance, engine, rated)
     std::vector<TyreLaw> tyres;
     std::vector<ConverterLaw> converters;
     std::vector<EngineLaw> engines;

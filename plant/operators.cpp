@@ -1,7 +1,6 @@
 // The table of modes: bounded, least recently used goes. A mode is a pure function of model, step size and
 // contact states, so forgetting one costs time, never bits.
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "plant/few.h"

@@ -24,7 +24,7 @@ void fill_outputs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
 
     if (mode.tree) tree_swings(w, mode, s);
     next = copy_few(s.z, m.masses, next);
-    const Shown at{w, mode, s};
+    const Shown at{w, s};
     const auto show_all = [&](const auto& devices) {
         if (!devices.empty()) next = show(at, devices, next);
     };

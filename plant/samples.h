@@ -29,7 +29,8 @@ struct Sample {
     double* z = nullptr;        // [ω; φ]
     // What operators multiply: q ends where f begins (`coordinates`), f is followed by the torques of the mode's
     // active rows. A product that gives q comes before f is filled, since its padding reaches into it.
-    double* f = nullptr;  // forces
+    double* f =
+        nullptr;  // forces; on a tree those of `late` lie in TreeWork::stage_effort, with nothing behind them
     double* active =
         nullptr;  // behind f: torques in the order of Mode::rows, then accelerations of translating masses
     double* auxiliary = nullptr;
@@ -44,7 +45,9 @@ struct Sample {
     double* converter = nullptr;         // pump, turbine torque per converter [Nm]
     double* engine_torque = nullptr;     // per engine [Nm]
     double* engine_full_load = nullptr;  // at its speed [Nm]
-    GroupState groups;                   // on a tree
+    // On a tree; and what its internal torques leave over, of the largest.
+    GroupState groups;
+    double torque_residual = 0;
 };
 
 // The course of what presses a pair together, where it changes within the step.
@@ -108,7 +111,6 @@ struct ScratchData {
     AlignedDoubles operator_memory, ledger_memory;  // operators of a partial step, of a part of one
     int told_events = 0;                            // so many of this step's events are told in full
     bool turned = false;                            // power turned round in some mesh within the last part
-    double torque_residual = 0;                     // of the tree's internal torques at `end`
     StepOperators used;                             // by the last advance
     StepOperators part;                             // in operator_memory, for a part of a step
     const Mode* part_mode = nullptr;                // of this mode, as it was when so many had been built

@@ -21,7 +21,7 @@ bool engage_and_release(Work& w, Sample& s) {
         if (capable != (w.contact[k] == free_running)) continue;
         const double slip = slip_of(pair_links(w, k), s.z);
         if (!capable && w.contact[k] != free_running) {
-            log_event(w, EventKind::release, k, s.at.time, s.torque[k], 0, slip);
+            log_event(w, EventKind::release, k, s.at.time, 0, 0, slip);  // nothing presses it any more
             w.contact[k] = free_running;
             changed = true;
         } else if (capable && w.contact[k] == free_running) {

@@ -7,7 +7,6 @@ namespace shiftrig::plant::detail {
 
 struct Shown {
     const Work& work;
-    const Mode& mode;
     const Sample& sample;
 
     const ModelData& model() const noexcept { return work.model; }

@@ -46,8 +46,8 @@ double part_end(double from, double split, double length) {
     return std::min(split, (std::floor(from / length + 1e-6) + 1) * length);
 }
 
-// Brings the beginning of the step to rest in itself. The end of a step that changed nothing is so already: every
-// device was looked at there.
+// Brings the beginning of the step to rest in itself. The end of a step that changed nothing is so already, or else it is not
+// carried over (finish_step).
 Mode& begin_mode(Work& w) SHIFTRIG_REALTIME {
     ScratchData& s = w.scratch;
     const bool begun = is_begun(w);
@@ -90,7 +90,7 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
         (rest > 0 ? low : high) = reached;
         (rest > 0 ? at_low : at_high) = rest;
         // Secant, kept off the ends of the bracket.
-        const double share = at_low > 0 ? at_low / (at_low - at_high) : 0.5;
+        const double share = at_low > 1e-12 * size ? at_low / (at_low - at_high) : 0.5;
         reached = low + std::clamp(share + beyond, 0.01, 0.99) * (high - low);
     }
 }

@@ -92,6 +92,8 @@ struct TreeMode {
     int* path_begin = nullptr;
     int* path_parent = nullptr;
     double* inside = nullptr;
+    double* inner_stiffness = nullptr;
+    double* inner_damping = nullptr;
     int* head = nullptr;
     int* run_begin = nullptr;
     int* run_parent = nullptr;
@@ -200,9 +202,9 @@ struct TreeWork {
     double *momentum = nullptr, *way = nullptr, *load = nullptr, *potential = nullptr, *speed[3] = {},
            *swing[4] = {};
     StageMatrix matrix;            // of a part of a step
-    const double* effort[4] = {};  // f of the stages,
-    double* stage_effort[3] = {};  // of which these are those after the first
-    double* auxiliary[4] = {};
+    const double* effort[4] = {};  // f of each stage: that of the beginning, then
+    double* stage_effort[3] = {};
+    double* auxiliary_rate[4] = {};  // of each stage
 };
 std::size_t tree_work_size(const ModelData& model) noexcept;  // in doubles
 void place_tree_work(const ModelData& model, TreeWork& work, double* memory) noexcept;
@@ -217,8 +219,8 @@ const GroupState& groups_of(const Work& work, const Mode& mode, Sample& sample) 
 void group_slips(const ModelData& model, const Mode& mode, const double* speed,
                  Sample& sample) SHIFTRIG_REALTIME;
 
-// Internal torques of the sample from its groups; returns their residual relative to the largest torque.
-double rigid_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+// Internal torques of the sample from its groups, and their residual.
+void rigid_torques(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
 // ---- the tree's versions of what the dense modes do with matrices (forces.h, transitions.h) ---------------
 

@@ -8,7 +8,9 @@
 
 namespace shiftrig::plant::detail {
 
-// The groups of a mode as the loops see them. Vectors may be read one element beyond either end.
+// The groups of a mode as the loops see them. Vectors are read and written in whole blocks: up to seven elements behind the last
+// group and one before the first belong to them. Only twists and ways have to be numbers there, behind the last group
+// and of ways before the first.
 struct TreePaths {
     int groups = 0;
     int count = 0;                   // paths
@@ -28,8 +30,10 @@ struct TreePaths {
     const double* inverse_mass = nullptr;  // 0 where grounded
     bool drags = false;                    // some group is damped to the housing
     const double* drag = nullptr;
-    const double* stiffness = nullptr;  // of the link to the parent; 0 at roots and behind the last group
-    const double* damping = nullptr;    // likewise
+    const double* stiffness = nullptr;  // of the link to the parent; 0 at roots
+    const double* damping = nullptr;
+    const double* inner_stiffness = nullptr;  // the same, 0 at heads and behind the last group as well
+    const double* inner_damping = nullptr;
 };
 
 // Differences δ along the shafts, their torques `passed` on the child (with the sign of ψ), and N = −(K ψ + D δ) on the

@@ -1,6 +1,6 @@
 // The loops of tree_kernels.h, included once per instruction set with SHIFTRIG_FMA(a, b, c) = a b + c of numbers and
-// SHIFTRIG_BLOCK_FMA the same of four of them. No function of the
-// standard library may be instantiated here: the linker would keep one copy for all instruction sets.
+// SHIFTRIG_BLOCK_FMA the same of four of them. No function of the standard library may be instantiated here: the linker
+// would keep one copy for all instruction sets.
 #include <cstdint>
 
 #include "plant/tree_kernels.h"
@@ -11,35 +11,19 @@ namespace {
 // All of it is inlined here: no other file ever passes a block by value.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
-using Block = double __attribute__((vector_size(32)));
-using Lanes = std::int64_t __attribute__((vector_size(32)));
 constexpr int lanes = tree_block;
+#include "plant/lanes_body.h"
 
-inline Block read(const double* p) noexcept {
-    Block v;
-    __builtin_memcpy(&v, p, sizeof v);
-    return v;
-}
-inline void write(double* p, const Block& v) noexcept {
-    __builtin_memcpy(p, &v, sizeof v);
-}
-
-inline Block all(double value) noexcept {
-    return Block{value, value, value, value};
+inline Lanes all(double value) noexcept {
+    return Lanes{value, value, value, value};
 }
 
 // The last numbers of one block and all but the last of the next: each group's parent inside a path.
-inline Block one_before(const Block& last, const Block& here) noexcept {
+inline Lanes one_before(const Lanes& last, const Lanes& here) noexcept {
     return __builtin_shufflevector(last, here, 3, 4, 5, 6);
 }
-inline Block one_behind(const Block& here, const Block& next) noexcept {
+inline Lanes one_behind(const Lanes& here, const Lanes& next) noexcept {
     return __builtin_shufflevector(here, next, 1, 2, 3, 4);
-}
-
-// 0 from this group on.
-inline Block up_to(int groups, int g, const Block& v) noexcept {
-    const Lanes place = Lanes{0, 1, 2, 3} + g;
-    return reinterpret_cast<Block>(reinterpret_cast<Lanes>(v) & (place < groups));
 }
 
 // Of value(g), in blocks: use(g, value, difference to the group before). At heads of paths that is nobody's business;
@@ -47,9 +31,9 @@ inline Block up_to(int groups, int g, const Block& v) noexcept {
 template <typename Value, typename Use, typename AtHead>
 inline void along_paths(const TreePaths& t, const Value& value, const Use& use,
                         const AtHead& at_head) noexcept {
-    Block last = {};
+    Lanes last = {};
     for (int g = 0, groups = t.groups; g < groups; g += lanes) {
-        const Block here = value(g);
+        const Lanes here = value(g);
         use(g, here, here - one_before(last, here));
         last = here;
     }
@@ -66,38 +50,36 @@ inline void set_at_roots(const TreePaths& t, double* values) noexcept {
 inline void differences(const TreePaths& t, const double* way, double* difference) noexcept {
     along_paths(
         t, [=](int g) { return read(way + g); },
-        [=](int g, const Block&, const Block& change) { write(difference + g, change); },
+        [=](int g, const Lanes&, const Lanes& change) { write(difference + g, change); },
         [=](int head, int parent) { difference[head] = way[head] - way[parent]; });
     set_at_roots(t, difference);
 }
 
 void shaft_torques(const TreePaths& t, const double* speed, const double* twist, double* rate, double* passed,
                    double* torque) SHIFTRIG_REALTIME {
-    const double *stiffness = t.stiffness, *damping = t.damping;
+    // Links to the group before first; what heads have passes another one by.
     along_paths(
         t, [=](int g) { return read(speed + g); },
-        [=](int g, const Block&, const Block& change) {
+        [=, stiffness = t.inner_stiffness, damping = t.inner_damping](int g, const Lanes&,
+                                                                      const Lanes& change) {
             write(rate + g, change);
             write(passed + g,
                   SHIFTRIG_BLOCK_FMA(read(stiffness + g), read(twist + g), read(damping + g) * change));
         },
-        [=](int head, int parent) {
-            rate[head] = speed[head] - speed[parent];
-            passed[head] = SHIFTRIG_FMA(stiffness[head], twist[head], damping[head] * rate[head]);
-        });
+        [=](int head, int parent) { rate[head] = speed[head] - speed[parent]; });
     set_at_roots(t, rate);
     const int groups = t.groups;
     passed[groups] = 0;
-    Block here = read(passed);
+    Lanes here = read(passed);
     for (int g = 0; g < groups; g += lanes) {
-        const Block next = read(passed + g + lanes);
+        const Lanes next = read(passed + g + lanes);
         write(torque + g, one_behind(here, next) - here);
         here = next;
     }
-    // passed[g] − passed[g + 1] belongs to g inside a path; heads hand theirs to another group.
     for (int i = 0; i < t.hanging; ++i) {
         const int head = t.head[i];
-        torque[head - 1] -= passed[head];
+        passed[head] = SHIFTRIG_FMA(t.stiffness[head], twist[head], t.damping[head] * rate[head]);
+        torque[head] -= passed[head];
         torque[t.up[head]] += passed[head];
     }
     if (!t.drags) return;
@@ -146,13 +128,13 @@ void combine(const TreePaths& t, const StageSums& s, double* momentum, double* w
 // x_i + L_i · (the one before) along a run is a chain of dependent operations. A block at a time it is a scan in a register,
 // and only what one block hands on to the next is a chain: TreeScan says what of a block's values goes on to which.
 // Shifted by one and by two; those at the end come round, and their factors are 0.
-inline Block from_below(const Block& v) noexcept {
+inline Lanes from_below(const Lanes& v) noexcept {
     return __builtin_shufflevector(v, v, 3, 0, 1, 2);
 }
-inline Block from_above(const Block& v) noexcept {
+inline Lanes from_above(const Lanes& v) noexcept {
     return __builtin_shufflevector(v, v, 1, 2, 3, 0);
 }
-inline Block by_two(const Block& v) noexcept {
+inline Lanes by_two(const Lanes& v) noexcept {
     return __builtin_shufflevector(v, v, 2, 3, 0, 1);
 }
 
@@ -171,10 +153,10 @@ inline void eliminate(const TreePaths& t, const StageMatrix& m, double* __restri
         double below = 0;  // of the group behind
         for (; g - lanes >= begin; g -= lanes) {
             const int at = g - lanes;
-            Block b = read(right + at);
+            Lanes b = read(right + at);
             b = SHIFTRIG_BLOCK_FMA(read(scan.by_one + at), from_above(b), b);
             b = SHIFTRIG_BLOCK_FMA(read(scan.by_two + at), by_two(b), b);
-            const Block outside = read(scan.from_outside + at);
+            const Lanes outside = read(scan.from_outside + at);
             write(right + at, SHIFTRIG_BLOCK_FMA(outside, all(below), b));
             below = SHIFTRIG_FMA(outside[0], below, b[0]);
         }
@@ -203,10 +185,10 @@ inline void substitute(const TreePaths& t, const StageMatrix& m, double* __restr
         double above = up >= 0 ? speed[up] : 0;
         int g = t.run_begin[run];
         for (; g + lanes <= end; g += lanes) {
-            Block q = read(inverse + g) * read(speed + g);
+            Lanes q = read(inverse + g) * read(speed + g);
             q = SHIFTRIG_BLOCK_FMA(read(scan.by_one + g), from_below(q), q);
             q = SHIFTRIG_BLOCK_FMA(read(scan.by_two + g), by_two(q), q);
-            const Block outside = read(scan.from_outside + g);
+            const Lanes outside = read(scan.from_outside + g);
             write(speed + g, SHIFTRIG_BLOCK_FMA(outside, all(above), q));
             above = SHIFTRIG_FMA(outside[lanes - 1], above, q[lanes - 1]);
         }
@@ -217,29 +199,24 @@ inline void substitute(const TreePaths& t, const StageMatrix& m, double* __restr
 void solve(const TreePaths& t, const StageMatrix& stage, const double* momentum, const Twists& twists,
            double* speed) SHIFTRIG_REALTIME {
     const double* __restrict p = momentum, * __restrict psi = twists.twist, * __restrict way = twists.way;
-    const double* __restrict stiffness = t.stiffness;
     double* __restrict right = speed;
     const double weight = stage.weight, share = twists.share;
-    const auto link = [=](int g, double difference) {
-        return weight * stiffness[g] * SHIFTRIG_FMA(share, difference, psi[g]);
-    };
-    // Links of a block at a time: those of the next one are needed for the last group of this one.
-    const auto links = [=](int g) {
-        const Block twisted =
+    // Links to the group before, a block at a time: those of the next one are needed for the last group of this one.
+    const auto links = [=, stiffness = t.inner_stiffness](int g) {
+        const Lanes twisted =
             SHIFTRIG_BLOCK_FMA(all(share), read(way + g) - read(way + g - 1), read(psi + g));
         return all(weight) * read(stiffness + g) * twisted;
     };
-    Block here = links(0);
+    Lanes here = links(0);
     for (int g = 0; g < t.groups; g += lanes) {
-        const Block next = links(g + lanes);
+        const Lanes next = links(g + lanes);
         write(right + g, read(p + g) + (one_behind(here, next) - here));
         here = next;
     }
     for (int i = 0; i < t.hanging; ++i) {
         const int g = t.head[i], up = t.up[g];
-        const double taken = link(g, way[g] - way[g - 1]), passed = link(g, way[g] - way[up]);
-        right[g - 1] -= taken;
-        right[g] += taken - passed;
+        const double passed = weight * t.stiffness[g] * SHIFTRIG_FMA(share, way[g] - way[up], psi[g]);
+        right[g] -= passed;
         right[up] += passed;
     }
     eliminate(t, stage, right);
@@ -252,11 +229,11 @@ void finish(const TreePaths& t, const Twists& twists, double weight, const doubl
     along_paths(
         t,
         [=](int g) {
-            const Block last = read(last_speed + g);
+            const Lanes last = read(last_speed + g);
             write(speed + g, last);
             return SHIFTRIG_BLOCK_FMA(all(weight), last, read(way + g));
         },
-        [=](int g, const Block&, const Block& turned) { write(twist + g, read(psi + g) + turned); },
+        [=](int g, const Lanes&, const Lanes& turned) { write(twist + g, read(psi + g) + turned); },
         [=](int head, int parent) {
             twist[head] = psi[head] + (SHIFTRIG_FMA(weight, last_speed[head], way[head]) -
                                        SHIFTRIG_FMA(weight, last_speed[parent], way[parent]));
@@ -266,27 +243,27 @@ void finish(const TreePaths& t, const Twists& twists, double weight, const doubl
 }
 
 // Σ weight (a² + 4 b² + c²)
-inline Block squares(const Block& weight, const Block& a, const Block& b, const Block& c) noexcept {
+inline Lanes squares(const Lanes& weight, const Lanes& a, const Lanes& b, const Lanes& c) noexcept {
     return weight * SHIFTRIG_BLOCK_FMA(4. * b, b, SHIFTRIG_BLOCK_FMA(a, a, c * c));
 }
 
 double middle(const TreePaths& t, const MiddleSums& s, double* speed) SHIFTRIG_REALTIME {
     const double *q0 = s.speed[0], *q1 = s.speed[1], *n0 = s.net[0], *n1 = s.net[1],
                  *inverse = t.inverse_mass, *d0 = s.rate[0], *d1 = s.rate[1];
-    const Block eighth = all(s.h / 8);
+    const Lanes eighth = all(s.h / 8);
     const int groups = t.groups;
-    Block sums = {};
+    Lanes sums = {};
     double at_heads = 0;
     along_paths(
         t,
         [=](int g) {
-            const Block change = (read(n0 + g) - read(n1 + g)) * read(inverse + g);
-            const Block q = SHIFTRIG_BLOCK_FMA(eighth, change, 0.5 * (read(q0 + g) + read(q1 + g)));
+            const Lanes change = (read(n0 + g) - read(n1 + g)) * read(inverse + g);
+            const Lanes q = SHIFTRIG_BLOCK_FMA(eighth, change, 0.5 * (read(q0 + g) + read(q1 + g)));
             write(speed + g, q);
             return q;
         },
-        [&](int g, const Block&, const Block& rate) {
-            sums += up_to(groups, g, squares(read(s.loss + g), read(d0 + g), rate, read(d1 + g)));
+        [&](int g, const Lanes&, const Lanes& rate) {
+            sums += where(first_of(groups - g), squares(read(s.loss + g), read(d0 + g), rate, read(d1 + g)));
         },
         [&](int head, int parent) {
             const double wrong = speed[head] - speed[head - 1], rate = speed[head] - speed[parent];
@@ -294,22 +271,19 @@ double middle(const TreePaths& t, const MiddleSums& s, double* speed) SHIFTRIG_R
         });
     if (t.drags) {
         for (int g = 0; g < groups; g += lanes)
-            sums +=
-                up_to(groups, g, squares(read(s.drag_loss + g), read(q0 + g), read(speed + g), read(q1 + g)));
+            sums += where(first_of(groups - g),
+                          squares(read(s.drag_loss + g), read(q0 + g), read(speed + g), read(q1 + g)));
     }
     return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + at_heads;
 }
 
 Swing swing_error(const TreePaths& t, const StageSums& s, double* way) SHIFTRIG_REALTIME {
     const double *q0 = s.speed[0], *q1 = s.speed[1], *q2 = s.speed[2], *q3 = s.speed[3];
-    const Block w0 = all(s.of_way[0]), w1 = all(s.of_way[1]), w2 = all(s.of_way[2]), w3 = all(s.of_way[3]);
+    const Lanes w0 = all(s.of_way[0]), w1 = all(s.of_way[1]), w2 = all(s.of_way[2]), w3 = all(s.of_way[3]);
     const int groups = t.groups;
     const double* const inside = t.inside;
-    const auto magnitude = [](const Block& v) {
-        return reinterpret_cast<Block>(reinterpret_cast<Lanes>(v) & INT64_MAX);
-    };
-    const auto largest = [](const Block& a, const Block& b) { return a > b ? a : b; };
-    Block errors = {}, speeds = {};
+    const auto largest = [](const Lanes& a, const Lanes& b) { return a > b ? a : b; };
+    Lanes errors = {}, speeds = {};
     Swing swing;
     along_paths(
         t,
@@ -319,11 +293,11 @@ Swing swing_error(const TreePaths& t, const StageSums& s, double* way) SHIFTRIG_
                 SHIFTRIG_BLOCK_FMA(w2, read(q2 + g),
                                    SHIFTRIG_BLOCK_FMA(w1, read(q1 + g), w0 * read(q0 + g))));
         },
-        [&](int g, const Block& turned, const Block& twisted) {
+        [&](int g, const Lanes& turned, const Lanes& twisted) {
             write(way + g, turned);
-            const Block error = read(inside + g) > 0. ? magnitude(twisted) : Block{};
-            errors = largest(up_to(groups, g, error), errors);
-            speeds = largest(up_to(groups, g, magnitude(read(q3 + g))), speeds);
+            const Lanes error = read(inside + g) > 0. ? magnitude(twisted) : Lanes{};
+            errors = largest(where(first_of(groups - g), error), errors);
+            speeds = largest(where(first_of(groups - g), magnitude(read(q3 + g))), speeds);
         },
         [&](int head, int parent) {
             const double error = __builtin_fabs(way[head] - way[parent]);
@@ -360,15 +334,11 @@ void correct(const TreePaths& t, const StageMatrix& stage, double* momentum, con
     }
 }
 
-inline Block gather(const double* values, const int* from) noexcept {
-    return Block{values[from[0]], values[from[1]], values[from[2]], values[from[3]]};
-}
-
 void slips(const GroupPairs& pairs, const double* of_group, const int* place, int count,
            double* values) SHIFTRIG_REALTIME {
     int i = 0;
     for (; i + lanes <= count; i += lanes) {
-        const Block slip = read(pairs.of_first + i) * gather(of_group, pairs.first + i) +
+        const Lanes slip = read(pairs.of_first + i) * gather(of_group, pairs.first + i) +
                            read(pairs.of_second + i) * gather(of_group, pairs.second + i);
         if (place[i + lanes - 1] - place[i] == lanes - 1) {  // places rise
             write(values + place[i], slip);
@@ -389,12 +359,12 @@ inline void give_efforts(const Efforts& e, const double* scale, double* sum) noe
     for (; i + lanes <= e.count; i += lanes) {
         const int* const place = e.place + i;
         const bool side_by_side = place[lanes - 1] - place[0] == lanes - 1;
-        Block effort = {};
+        Lanes effort = {};
         for (int j = 0; j < e.terms; ++j) {
-            const Block term = side_by_side ? read(e.effort[j] + place[0]) : gather(e.effort[j], place);
+            const Lanes term = side_by_side ? read(e.effort[j] + place[0]) : gather(e.effort[j], place);
             effort = SHIFTRIG_BLOCK_FMA(all(e.weight[j]), term, effort);
         }
-        const Block first = read(e.share.of_first + i) * effort,
+        const Lanes first = read(e.share.of_first + i) * effort,
                     second = read(e.share.of_second + i) * effort;
         for (int j = 0; j < lanes; ++j) {
             give(e.share.first[i + j], first[j]);

@@ -53,7 +53,7 @@ std::size_t place_work(const ModelData& m, TreeWork& work, double* memory) {
     for (double*& vector : work.swing) vector = take();
     place_matrix(work.matrix, shelf, mode_stride(m));
     for (double*& vector : work.stage_effort) vector = shelf.take(whole_panels(m.forces));
-    for (double*& vector : work.auxiliary) vector = shelf.take(m.auxiliary);
+    for (double*& vector : work.auxiliary_rate) vector = shelf.take(m.auxiliary);
     return shelf.used() + margin;  // blocks reach beyond the last part
 }
 
@@ -65,9 +65,10 @@ TreeSizes place_tree(const ModelData& m, TreeMode& t, const TreeMemory& memory) 
     const int n = mode_stride(m), grounds = static_cast<int>(m.tree->grounds.size()) + m.meshes,
               pairs = whole_panels(std::max(m.forces, m.meshes));  // by force or mesh
     for (double** array :
-         {&t.ratio, &t.force_ratio, &t.mass, &t.inverse_mass, &t.drag, &t.stiffness, &t.damping, &t.loss,
-          &t.drag_loss, &t.edge_own, &t.edge_up, &t.network_inverse, &t.network_lower, &t.speed_factor,
-          &t.twist_factor, &t.mass_ratio, &t.shaft_ratio, &t.inside})
+         {&t.ratio,      &t.force_ratio,     &t.mass,          &t.inverse_mass,    &t.drag,
+          &t.stiffness,  &t.damping,         &t.loss,          &t.drag_loss,       &t.edge_own,
+          &t.edge_up,    &t.network_inverse, &t.network_lower, &t.speed_factor,    &t.twist_factor,
+          &t.mass_ratio, &t.shaft_ratio,     &t.inside,        &t.inner_stiffness, &t.inner_damping})
         *array = doubles.take(n);
     place_matrix(t.matrix, doubles, n);
     t.end_factor = doubles.take(2 * n);  // two ends of every link

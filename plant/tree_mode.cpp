@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "plant/ark3.h"
-#include "plant/contact.h"
 #include "plant/forces.h"
 #include "plant/modes.h"
 #include "plant/tree.h"
@@ -75,7 +74,6 @@ void weigh_groups(const ModelData& m, const Mode& mode, TreeMode& t) {
         t.drag_loss[g] += t.ratio[p] * t.ratio[p] * topology.ground_damping[i];
     }
     for (int g = 0; g < groups; ++g) t.inverse_mass[g] = t.grounded[g] ? 0 : 1 / t.mass[g];
-    t.stiffness[groups] = t.damping[groups] = 0;
     t.paths.drags = std::any_of(t.drag, t.drag + groups, [](double drag) { return drag != 0; });
 }
 
@@ -85,6 +83,8 @@ void find_paths(TreeMode& t) {
     paths.count = paths.run_count = paths.hanging = 0;
     for (int g = 0; g < paths.groups; ++g) {
         t.inside[g] = g > 0 && t.parent[g] == g - 1 ? 1 : 0;
+        t.inner_stiffness[g] = t.inside[g] * t.stiffness[g];
+        t.inner_damping[g] = t.inside[g] * t.damping[g];
         if (t.inside[g] != 0) continue;
         if (g == 0 || t.parent[g] >= 0) {
             t.run_begin[paths.run_count] = g;
@@ -94,6 +94,7 @@ void find_paths(TreeMode& t) {
         t.path_begin[paths.count] = g;
         t.path_parent[paths.count++] = t.parent[g];
     }
+    t.inner_stiffness[paths.groups] = t.inner_damping[paths.groups] = 0;
     t.path_begin[paths.count] = paths.groups;
     t.run_begin[paths.run_count] = paths.groups;
     for (int g = 0; g < paths.groups; ++g) t.up[g] = t.parent[g] < 0 ? 0 : t.parent[g];
@@ -105,6 +106,8 @@ void find_paths(TreeMode& t) {
     paths.parent = t.path_parent;
     paths.head = t.head;
     paths.inside = t.inside;
+    paths.inner_stiffness = t.inner_stiffness;
+    paths.inner_damping = t.inner_damping;
     paths.mass = t.mass;
     paths.inverse_mass = t.inverse_mass;
     paths.drag = t.drag;

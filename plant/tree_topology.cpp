@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cstdint>
 
 #include "plant/model_data.h"
 #include "plant/tree.h"

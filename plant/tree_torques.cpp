@@ -83,7 +83,7 @@ void group_slips(const ModelData& m, const Mode& mode, const double* speed, Samp
     }
 }
 
-double rigid_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+void rigid_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     const GroupState& groups = s.groups;
     const TreeMode& t = *mode.tree;
@@ -120,17 +120,15 @@ double rigid_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTI
         load[edge.parent] -= edge.up * moment;
     }
     for (int i = 0; i < t.spent_count; ++i) rest = std::max(rest, std::fabs(load[t.spent[i]]));
-    for (int k = 0; k < m.pairs; ++k) scale = std::max(scale, std::fabs(torque[k]));
-    return scale > 0 ? rest / scale : 0;
+    for (int k = 0; k < m.torques; ++k) scale = std::max(scale, std::fabs(torque[k]));
+    s.torque_residual = scale > 0 ? rest / scale : 0;
 }
 
-// Where somebody asks for them, z or f are other than they were.
+// Read anew: whoever asks has changed z or f.
 void tree_internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
-    ScratchData& scratch = w.scratch;
     read_groups(*mode.tree, s.z, s.groups);
     complete_groups(w, mode, s);
-    const double residual = rigid_torques(w, mode, s);
-    if (&s == &scratch.begin() || &s == &scratch.end()) scratch.torque_residual = residual;
+    rigid_torques(w, mode, s);
 }
 
 void tree_slips(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {

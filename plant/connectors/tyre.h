@@ -15,7 +15,7 @@ struct BrixiusTyre {
     double radius = 0;               // rolling radius [m]
     double mobility_number = 0;      // Bn [1]; initial value of input `environment.mobility_number`
     double relaxation_length = 0;    // σ [m]
-    double slip_damping_time = 0;    // τ [s] of numerics.md §9
+    double slip_damping_time = 0;    // τ [s]
     double weight = 0;               // on this contact [N]
     double rolling_coefficient = 0;  // 0.04: rolling moment coeff·W·r as a friction device on the wheel
     // The rest of the motion resistance acts on the body as a friction device (1/Bn + 0.5|s|/√Bn)·W.

@@ -28,9 +28,27 @@ inline double power_of_two(std::int64_t k) noexcept {
 }
 
 // Nearest integer of |x| < 2^51, ties to even.
+inline constexpr double nearest_shift = 0x1.8p52;
 inline double nearest(double x) noexcept {
-    constexpr double shift = 0x1.8p52;
-    return (x + shift) - shift;
+    return (x + nearest_shift) - nearest_shift;
+}
+
+// e^x / 2^k for k = nearest(x / ln 2), of a number or of a register of them.
+inline constexpr double exp_inverse_ln2 = 0x1.71547652b82fep0;
+template <typename Number>
+inline Number exp_remainder(const Number& x, const Number& k) noexcept {
+    constexpr double ln2_high = 0x1.62e42fefa38p-1;   // 41 bits: k·ln2_high is exact for |k| < 2^11
+    constexpr double ln2_low = 0x1.ef35793c7673p-45;  // the next 53
+    const Number high = x - k * ln2_high;
+    const Number low = k * ln2_low;
+    const Number r = high - low;
+    const Number r2 = r * r, r4 = r2 * r2;
+    const Number p0 = (1.0 / 2 + r * (1.0 / 6)) + r2 * (1.0 / 24 + r * (1.0 / 120));
+    const Number p1 = (1.0 / 720 + r * (1.0 / 5040)) + r2 * (1.0 / 40320 + r * (1.0 / 362880));
+    const Number p2 =
+        (1.0 / 3628800 + r * (1.0 / 39916800)) + r2 * (1.0 / 479001600 + r * (1.0 / 6227020800.0));
+    const Number p = p0 + r4 * (p1 + r4 * p2);
+    return 1.0 + (high - (low - r2 * p));
 }
 
 }  // namespace detail
@@ -38,20 +56,8 @@ inline double nearest(double x) noexcept {
 inline double exp(double x) noexcept {
     if (!(x < 709.79)) return x != x ? x : std::numeric_limits<double>::infinity();
     if (x < -745.2) return 0;
-    constexpr double inverse_ln2 = 0x1.71547652b82fep0;
-    constexpr double ln2_high = 0x1.62e42fefa38p-1;   // 41 bits: k·ln2_high is exact for |k| < 2^11
-    constexpr double ln2_low = 0x1.ef35793c7673p-45;  // the next 53
-    const double k = detail::nearest(x * inverse_ln2);
-    const double high = x - k * ln2_high;
-    const double low = k * ln2_low;
-    const double r = high - low;
-    const double r2 = r * r, r4 = r2 * r2;
-    const double p0 = (1.0 / 2 + r * (1.0 / 6)) + r2 * (1.0 / 24 + r * (1.0 / 120));
-    const double p1 = (1.0 / 720 + r * (1.0 / 5040)) + r2 * (1.0 / 40320 + r * (1.0 / 362880));
-    const double p2 =
-        (1.0 / 3628800 + r * (1.0 / 39916800)) + r2 * (1.0 / 479001600 + r * (1.0 / 6227020800.0));
-    const double p = p0 + r4 * (p1 + r4 * p2);
-    const double e = 1 + (high - (low - r2 * p));
+    const double k = detail::nearest(x * detail::exp_inverse_ln2);
+    const double e = detail::exp_remainder(x, k);
     const auto n = static_cast<std::int64_t>(k);
     if (n >= -1021 && n <= 1022) return e * detail::power_of_two(n);
     const std::int64_t half = n / 2;  // near overflow, or a subnormal result

@@ -8,30 +8,17 @@
 #include <string>
 #include <vector>
 
-#include "plant/kernels.h"
 #include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/oil.h"
 #include "plant/laws/sensor.h"
+#include "tests/plant/kernel_kinds.h"
 
 namespace shiftrig::plant::detail {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr int most = 19;  // beyond two registers, whatever their size
-
-// Those that this processor runs: of the others there is nothing to see.
-std::vector<KernelKind> kernels() {
-    std::vector<KernelKind> offered;
-    for (const KernelKind kind : {KernelKind::portable, KernelKind::avx2, KernelKind::avx512}) {
-        try {
-            choose_kernel(kind);
-            offered.push_back(kind);
-        } catch (const ModelError&) {
-        }
-    }
-    return offered;
-}
 
 class DeviceLoopsOf : public testing::TestWithParam<KernelKind> {
   protected:
@@ -54,8 +41,7 @@ class DeviceLoopsOf : public testing::TestWithParam<KernelKind> {
     std::mt19937_64 random{7};
 };
 
-INSTANTIATE_TEST_SUITE_P(Kernels, DeviceLoopsOf, testing::ValuesIn(kernels()),
-                         [](const auto& kind) { return std::string(choose_kernel(kind.param).name); });
+INSTANTIATE_TEST_SUITE_P(Kernels, DeviceLoopsOf, testing::ValuesIn(offered_kernels()), kernel_name);
 
 TEST_P(DeviceLoopsOf, SeeTheOneSpeedThatHasTheWrongSense) {
     for (int count = 1; count <= most; ++count) {

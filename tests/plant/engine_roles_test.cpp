@@ -218,54 +218,5 @@ TEST(Constraints, DoNotDriftInAMillionStepsAlongTheTree) {
     expect_no_drift(d, "ark3");
 }
 
-// The pressure of a wet clutch without return springs dies out to nothing at the end of a step: it is let go, and its oil
-// drags, whether the step before is remembered or not.
-TEST(Roles, AClutchThatNothingPressesIsLetGoWhetherTheLastStepIsRememberedOrNot) {
-    for (const Method method : {Method::etd3, Method::ark3}) {
-        Description d;
-        d.name = "fading pressure";
-        d.method = method;
-        d.masses = {mass("a", 1, 100), mass("b", 1, -20)};
-        WetPlates plates;
-        plates.surfaces = 8;
-        plates.outer_radius = 0.1;
-        plates.inner_radius = 0.07;
-        plates.piston_area = 0.008;
-        plates.mu_sliding = 0.09;
-        plates.mu_static = 0.13;
-        plates.mu_rise = 0.03;
-        plates.mu_speed = 1;
-        plates.clearance = 2e-4;
-        ActuationHydraulic hydraulic;
-        hydraulic.natural_frequency = 60;
-        hydraulic.damping_ratio = 0.7;
-        hydraulic.slew = 1e8;
-        hydraulic.maximum_pressure = 18e5;
-        Clutch c;
-        c.name = "c";
-        c.a = "a";
-        c.b = "b";
-        c.friction = plates;
-        c.actuation = hydraulic;
-        c.drag = true;
-        d.clutches = {c};
-        Oil oil;
-        oil.viscosity_at_zero = 0.2;
-        oil.viscosity_decay = 0.03;
-        oil.initial_temperature = 40;
-        d.oil = oil;
-        Rig kept(d), dropped(d);
-        for (int n = 0; n < 1500; ++n) {
-            for (Rig* rig : {&kept, &dropped})
-                rig->in("clutch.c.pressure_command") = n >= 100 && n < 110 ? 0.3e5 : 0;
-            dropped.operators.drop();
-            kept.step();
-            dropped.step();
-            ASSERT_EQ(kept.state.block, dropped.state.block) << "step " << n;
-        }
-        EXPECT_EQ(kept.out("clutch.c.state"), 2) << "free";
-    }
-}
-
 }  // namespace
 }  // namespace shiftrig::plant

@@ -11,31 +11,10 @@
 #include "plant/laws/tyre.h"
 #include "plant/laws/waveform.h"
 #include "plant/laws/wheel_contact.h"
+#include "tests/plant/parts.h"
 
 namespace shiftrig::plant {
 namespace {
-
-WetPlates powershift_plates() {
-    WetPlates p;
-    p.surfaces = 8;
-    p.outer_radius = 0.110;
-    p.inner_radius = 0.085;
-    p.piston_area = 0.0150;
-    p.return_pressure = 1.2e5;
-    p.mu_static = 0.13;
-    p.mu_sliding = 0.10;
-    p.mu_rise = 0.025;
-    p.mu_speed = 0.3;
-    p.clearance = 0.25e-3;
-    return p;
-}
-
-Oil reference_oil() {
-    Oil oil;
-    oil.viscosity_at_zero = 0.5;
-    oil.viscosity_decay = 0.0414;
-    return oil;
-}
 
 BrixiusTyre reference_tyre() {
     BrixiusTyre tyre;

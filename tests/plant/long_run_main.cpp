@@ -16,7 +16,7 @@
 namespace shiftrig::plant {
 namespace {
 
-constexpr double most_violation = 3 * 6e-14;  // of numerics.md §14 [rad/s]
+constexpr double most_violation = 3 * 6e-14;  // three times what a prototype reached [rad/s]
 
 struct Tractor {
     Tractor()

@@ -26,6 +26,29 @@ inline Clutch clutch(const std::string& name, const std::string& a, const std::s
     return c;
 }
 
+// Of the reference tractor.
+inline WetPlates powershift_plates() {
+    WetPlates p;
+    p.surfaces = 8;
+    p.outer_radius = 0.110;
+    p.inner_radius = 0.085;
+    p.piston_area = 0.0150;
+    p.return_pressure = 1.2e5;
+    p.mu_static = 0.13;
+    p.mu_sliding = 0.10;
+    p.mu_rise = 0.025;
+    p.mu_speed = 0.3;
+    p.clearance = 0.25e-3;
+    return p;
+}
+
+inline Oil reference_oil() {
+    Oil oil;
+    oil.viscosity_at_zero = 0.5;
+    oil.viscosity_decay = 0.0414;
+    return oil;
+}
+
 inline Gear lossy_gear(const std::string& name, const std::string& a, const std::string& b, double ratio,
                        double efficiency, double bearing) {
     Gear gear;

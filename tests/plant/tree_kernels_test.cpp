@@ -13,6 +13,7 @@
 
 #include "plant/modes.h"
 #include "plant/tree.h"
+#include "tests/plant/kernel_kinds.h"
 #include "tests/plant/parts.h"
 
 namespace shiftrig::plant::detail {
@@ -107,19 +108,7 @@ class TreeKernelsOf : public testing::TestWithParam<KernelKind> {
     int branching = 0, scanned = 0;
 };
 
-std::vector<KernelKind> kernels() {
-    std::vector<KernelKind> offered;
-    for (const KernelKind kind : {KernelKind::portable, KernelKind::avx2, KernelKind::avx512}) {
-        try {
-            choose_kernel(kind);
-            offered.push_back(kind);
-        } catch (const ModelError&) {
-        }
-    }
-    return offered;
-}
-INSTANTIATE_TEST_SUITE_P(Kernels, TreeKernelsOf, testing::ValuesIn(kernels()),
-                         [](const auto& kind) { return std::string(choose_kernel(kind.param).name); });
+INSTANTIATE_TEST_SUITE_P(Kernels, TreeKernelsOf, testing::ValuesIn(offered_kernels()), kernel_name);
 
 TEST_P(TreeKernelsOf, SolveTheStageMatrix) {
     on_forests([&](const ModelData& m, const TreeMode& tree, const TreePaths& t) {
