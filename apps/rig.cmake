@@ -3,6 +3,7 @@ include(${CMAKE_CURRENT_LIST_DIR}/tcu.cmake)
 # The rig: plant, scenario, buses and loop put together.
 add_library(shiftrig_rig STATIC
   ${CMAKE_CURRENT_LIST_DIR}/rig/buses.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/rig/certificate.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/choices.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/collector.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rig/events.cpp

@@ -25,6 +25,8 @@ class ModelReader {
 
     ModelFile read() {
         const YAML::Node root = parse_yaml(file_.text, file_.path);
+        if (root.IsMap() && root["model"] && !root["masses"])
+            throw InputError(file_.path, 0, 0, "names a model and has no masses: a scenario, for --scenario");
         FieldReader reader(context_, root, root.Mark(), "", "");
         fields(reader, model_);
         reader.finish();

@@ -134,17 +134,30 @@ Efforts efforts(const TreeMode& t, const double (&shares)[stages], int count, co
 // Where shafts swing, makes the linear part of the step one of order 4. hL/(1 − hγL)² in place of hL: the same to that
 // order, nothing where hω is large, and the step stays L-stable. With S = (1 − hγL)⁻¹, which a stage solves with,
 // it is (S² − S)/γ.
-void complete_swing(const ModelData& m, const TreeMode& t, const TreeWork& v, double h,
-                    const StageMatrix& stage, const GroupState& begin, GroupState& end) {
+void complete_swing(const ModelData& m, const TreeMode& t, TreeWork& v, double h, const StageMatrix& stage,
+                    const GroupState& begin, GroupState& end) {
     const TreeKernel& kernel = m.tree->kernel;
     const StageSums sums = stage_sums(swing_impulse, embedded_error, stages, begin, v, h);
-    const Swing swing = kernel.swing_error(t.paths, sums, v.way);
+    const Swing swing = v.swing_seen = kernel.swing_error(t.paths, sums, v.way);
     if (!(swing.error > ark3_swing_tolerance * h * std::max(swing.fastest, at_rest))) return;
     kernel.combine(t.paths, sums, v.momentum, v.way);
     kernel.give(efforts(t, swing_impulse.effort, stages, v, h), nullptr, v.momentum);
     constexpr double factor = -excess / embedded / gamma;
     kernel.correct(t.paths, stage, v.momentum, v.way, factor,
                    {v.swing[0], v.swing[1], v.swing[2], v.swing[3]}, end.speed, end.twist);
+}
+
+// Parts of one length share their matrix.
+const StageMatrix& part_matrix(Work& w, const Mode& mode, double weight) {
+    ScratchData& s = w.scratch;
+    StageMatrix& matrix = s.tree.matrix;
+    if (s.part_mode != &mode || s.part_modes_built != w.operators.misses || matrix.weight != weight) {
+        matrix.weight = weight;
+        factor_stage(*mode.tree, matrix);
+        s.part_mode = &mode;
+        s.part_modes_built = w.operators.misses;
+    }
+    return matrix;
 }
 
 }  // namespace
@@ -159,11 +172,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     const double from = begin.at.fraction, length = end_fraction - from;
     const double h = length * w.h;
     const bool whole = from == 0 && end_fraction == 1;
-    if (!whole) {
-        v.matrix.weight = h * ark3_gamma;
-        factor_stage(t, v.matrix);
-    }
-    const StageMatrix& matrix = whole ? t.matrix : v.matrix;
+    const StageMatrix& matrix = whole ? t.matrix : part_matrix(w, mode, h * ark3_gamma);
 
     tabulate_contact(w, mode);
     const GroupState& start = groups_of(w, mode, begin);
@@ -198,6 +207,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     double lacks[stages];
     for (int j = 0; j < stages; ++j) lacks[j] = weights[j] - explicit_table[stages - 1][j];
     kernel.give(efforts(t, lacks, stages, v, h), t.inverse_mass, groups.speed);
+    v.swing_seen = {};
     if (t.swings) complete_swing(m, t, v, h, matrix, start, groups);
     for (int a = 0; a < m.auxiliary; ++a) {
         double change = 0;

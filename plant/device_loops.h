@@ -91,6 +91,9 @@ struct DeviceLoops {
     Work3 (*book)(const PowerTerms& terms, double h, double* work) SHIFTRIG_REALTIME = nullptr;
     void (*subtract)(const double* a, const double* b, int count,
                      double* difference) SHIFTRIG_REALTIME = nullptr;
+    // The largest magnitude, of the values and of a − b.
+    double (*largest)(const double* v, int count) SHIFTRIG_REALTIME = nullptr;
+    double (*largest_difference)(const double* a, const double* b, int count) SHIFTRIG_REALTIME = nullptr;
     // Σ rest² / Σ v², 0 where v is
     double (*share_of_squares)(const double* rest, int rests, const double* v,
                                int count) SHIFTRIG_REALTIME = nullptr;

@@ -107,6 +107,35 @@ void subtract(const double* a, const double* b, int count, double* difference) S
     for (int i = 0; i < count; i += lanes) write(difference + i, read(a + i) - read(b + i));
 }
 
+// The largest magnitude among so many of value(i), i = 0, lanes, 2 lanes …; two at a time, since each waits for the one before.
+template <typename Value>
+inline double largest_of(int count, const Value& value) noexcept {
+    const auto larger = [](const Lanes& a, const Lanes& b) { return a > b ? a : b; };
+    Lanes most = {}, other = {};
+    int i = 0;
+    for (; i + 2 * lanes <= count; i += 2 * lanes) {
+        most = larger(magnitude(value(i)), most);
+        other = larger(magnitude(value(i + lanes)), other);
+    }
+    for (; i < count; i += lanes) most = larger(where(first_of(count - i), magnitude(value(i))), most);
+    most = larger(other, most);
+    double largest[lanes];
+    write(largest, most);
+    for (int half = lanes / 2; half > 0; half /= 2) {
+        for (int j = 0; j < half; ++j)
+            largest[j] = largest[j + half] > largest[j] ? largest[j + half] : largest[j];
+    }
+    return largest[0];
+}
+
+double largest(const double* v, int count) SHIFTRIG_REALTIME {
+    return largest_of(count, [=](int i) { return read(v + i); });
+}
+
+double largest_difference(const double* a, const double* b, int count) SHIFTRIG_REALTIME {
+    return largest_of(count, [=](int i) { return read(a + i) - read(b + i); });
+}
+
 inline double square(const double* v, int count) noexcept {
     Lanes sums = {};
     for (; count > 0; count -= lanes, v += lanes) {
@@ -221,6 +250,6 @@ double* show_shafts(const ShaftValues& s, double* next) SHIFTRIG_REALTIME {
     return twist + s.count;
 }
 
-constexpr DeviceLoops device_loops{senses_hold, may_dip,          slide,           press,      book,
-                                   subtract,    share_of_squares, weighted_square, same,       copy,
-                                   heat,        pick_up,          show_clutches,   show_shafts};
+constexpr DeviceLoops device_loops{
+    senses_hold,      may_dip,         slide, press, book, subtract, largest,       largest_difference,
+    share_of_squares, weighted_square, same,  copy,  heat, pick_up,  show_clutches, show_shafts};

@@ -245,7 +245,8 @@ void build_outputs(ModelBuilder& builder) {
     add("certificate.fall_backs", Unit::one, "state changes deferred to the end of this step");
     add("certificate.mode_lookups", Unit::one, "modes asked for");
     add("certificate.mode_misses", Unit::one, "modes built");
-    add("certificate.flags", Unit::one, "bit 0 tie-up, bit 1 direction search gave up, bit 2 not finite");
+    add("certificate.flags", Unit::one,
+        "bit 0 tie-up, bit 1 direction search gave up, bit 2 not finite, bit 3 coarse");
 }
 
 }  // namespace

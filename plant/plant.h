@@ -81,8 +81,9 @@ struct Certificate {
     std::int32_t fall_backs = 0;      // next-step rule used
     std::int32_t mode_lookups = 0;
     std::int32_t mode_misses = 0;  // operators built in this step
-    std::int32_t flags =
-        0;  // bit 0: tie-up (split not unique); bit 1: direction search gave up; bit 2: not finite
+    // Bit 0: tie-up (split not unique); 1: direction search gave up; 2: not finite; 3: even the shortest parts that
+    // Description::maximum_parts allows are coarse (docs/mechanics.md, One step).
+    std::int32_t flags = 0;
 };
 
 enum class KernelKind { automatic, portable, avx2, avx512 };

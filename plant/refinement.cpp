@@ -3,52 +3,47 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plant/ark3.h"
 #include "plant/modes.h"
 
 namespace shiftrig::plant::detail {
 namespace {
 
-constexpr double force_tolerance = 2e-5;  // of the largest torque
-constexpr double swing_tolerance = 2e-5;
-constexpr double speed_tolerance = 1e-6;  // of the largest speed
+// Of the largest torque, of the largest speed, of the way that the fastest mass turns.
+constexpr double force_tolerance = 2e-5, swing_tolerance = 2e-5, speed_tolerance = 1e-6,
+                 twist_tolerance = 3e-6;
 
-double largest_torque(const ModelData& m, const Sample& s) {
-    double largest = 0;
-    for (int k = 0; k < m.torques; ++k) largest = std::max(largest, std::fabs(s.torque[k]));
-    for (int k = 0; k < m.first_flank_force; ++k) largest = std::max(largest, std::fabs(s.f[k]));
-    return largest;
+// Is this more than so much of the largest torque? That the forces are among these mostly settles it.
+bool exceeds(const Work& w, double torque, double share) {
+    const ModelData& m = w.model;
+    const DeviceLoops& loops = m.kernel.loops;
+    const auto within = [=](double size) { return !(torque > share * size); };
+    const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
+    return !within(loops.largest(end.f, m.first_flank_force)) &&
+           !within(loops.largest(end.torque, m.torques)) &&
+           !within(loops.largest(begin.f, m.first_flank_force)) &&
+           !within(loops.largest(begin.torque, m.torques));
 }
 
-}  // namespace
-
-bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+// The last stage stands on an extrapolation: what it took the forces to be, `late`, and what they are. A light body makes much
+// of a little torque, so speeds matter as well: at the end they differ by at most `reach` times the largest of those
+// differences, and by change() in fact.
+template <typename Change>
+bool takes_forces_amiss(const Work& w, const double* late, double reach, const Change& change) {
     const ModelData& m = w.model;
-    const Sample &begin = w.scratch.begin(), &half = w.scratch.half, &late = w.scratch.late,
-                 &end = w.scratch.end();
-    const double size = std::max(largest_torque(m, begin), largest_torque(m, end));
-    // The last stage stands on an extrapolation: what it takes the forces to be, and what they are.
-    double wrong = 0;
-    for (int k = 0; k < m.forces; ++k) {
-        if (k < m.pairs && w.contact[k] == locked) continue;
-        wrong = std::max(wrong, std::fabs(end.f[k] - late.f[k]));
-    }
-    if (wrong > force_tolerance * size) return true;
-    // A light body makes much of a little torque: what that difference would do to the speeds at the end.
-    if (wrong > 1e-3 * force_tolerance * size) {
-        double* difference = w.scratch.vector_c;
-        double* change = w.scratch.vector_b;
-        for (int k = 0; k < m.forces; ++k) difference[k] = end.f[k] - late.f[k];
-        m.kernel.multiply(w.scratch.used.from_late, padded(mode.order), m.forces, difference, nullptr,
-                          change);
-        double fastest = 0, moved = 0;
-        for (int j = 0; j < m.masses; ++j) fastest = std::max(fastest, std::fabs(end.z[j]));
-        for (int i = 0; i < mode.order; ++i) {
-            if (mode.coordinates[i] < m.masses) moved = std::max(moved, std::fabs(change[i]));
-        }
-        if (moved > speed_tolerance * fastest) return true;
-    }
-    // Twists (the last coordinates, just before f) half way, exact and by the cubic through both ends: what lies between
-    // does not show at the ends.
+    const DeviceLoops& loops = m.kernel.loops;
+    const Sample& end = w.scratch.end();
+    const double wrong = loops.largest_difference(end.f, late, m.forces);
+    if (wrong == 0) return false;
+    const double much = speed_tolerance * loops.largest(end.z, m.masses);
+    return (reach * wrong > much && change() > much) || exceeds(w, wrong, force_tolerance);
+}
+
+// Twists (the last coordinates, just before f) half way, exact and by the cubic through both ends: what lies between does
+// not show at the ends.
+bool hides_swing(const Work& w) {
+    const ModelData& m = w.model;
+    const Sample &begin = w.scratch.begin(), &half = w.scratch.half, &end = w.scratch.end();
     const double h = end.at.time - begin.at.time;
     double hidden = 0;
     for (int e = 0; e < m.twists; ++e) {
@@ -59,7 +54,51 @@ bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
         hidden = std::max(hidden, m.structure.shafts[static_cast<std::size_t>(e)].stiffness *
                                       std::fabs(half.f[e - m.twists] - cubic));
     }
-    return hidden > swing_tolerance * size;
+    return exceeds(w, hidden, swing_tolerance);
+}
+
+bool is_dense_coarse(Work& w, const Mode& mode) {
+    const ModelData& m = w.model;
+    const Sample &late = w.scratch.late, &end = w.scratch.end();
+    const auto change = [&] {
+        double* difference = w.scratch.vector_c;
+        double* changed = w.scratch.vector_b;
+        m.kernel.loops.subtract(end.f, late.f, m.forces, difference);
+        m.kernel.multiply(w.scratch.used.from_late, padded(mode.order), m.forces, difference, nullptr,
+                          changed);
+        double moved = 0;
+        for (int i = 0; i < mode.order; ++i) {
+            if (mode.coordinates[i] < m.masses) moved = std::max(moved, std::fabs(changed[i]));
+        }
+        return moved;
+    };
+    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || hides_swing(w);
+}
+
+// Along the tree shafts are not exact: the embedded method says how near they are.
+bool is_tree_coarse(Work& w, const Mode& mode) {
+    const ModelData& m = w.model;
+    const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
+    const TreeMode& t = *mode.tree;
+    const TreeWork& v = w.scratch.tree;
+    const double h = end.at.time - begin.at.time, weight = ark3_gamma * h;  // of the last stage
+    const double* const late = v.effort[3];
+    const auto change = [&] {
+        double* const difference = w.scratch.vector_c;
+        m.kernel.loops.subtract(end.f, late, m.forces, difference);
+        std::fill(v.load, v.load + t.paths.groups, 0.);
+        m.tree->kernel.give({t.force_share, t.force, t.force_count, 1, {difference}, {weight}},
+                            t.inverse_mass, v.load);
+        return m.kernel.loops.largest(v.load, t.paths.groups);
+    };
+    return v.swing_seen.error > twist_tolerance * h * v.swing_seen.fastest ||
+           takes_forces_amiss(w, late, weight * t.liveliness, change);
+}
+
+}  // namespace
+
+bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
+    return mode.tree ? is_tree_coarse(w, mode) : is_dense_coarse(w, mode);
 }
 
 double first_knot(const Work& w) SHIFTRIG_REALTIME {

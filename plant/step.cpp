@@ -155,13 +155,18 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     double length = 1;             // of a part, at most
     int leans = m.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
     int dips = m.maximum_events;   // margins looked at where they are least
-    const double longest_whole = (2 - 1e-9) / (localise && !mode->tree ? m.maximum_parts : 1);
+    const bool divides = localise && m.maximum_parts > 1;
+    const double halvable = (2 - 1e-9) / m.maximum_parts;  // a part of this length
     for (double done = 0; done < 1;) {
         // Advance over what is left, up to the next jump of a law; in halves where that is too much at once.
         const double split = next_split(w, done);
         double until = part_end(done, split, length);
         integrate(w, *mode, until);
-        while (length > longest_whole && (is_coarse(w, *mode) || hides_contact(w))) {
+        while (divides && (is_coarse(w, *mode) || hides_contact(w))) {
+            if (length < halvable) {
+                outputs.certificate.flags |= 8;
+                break;
+            }
             length *= 0.5;
             until = part_end(done, split, length);
             integrate(w, *mode, until);

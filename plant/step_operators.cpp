@@ -187,6 +187,13 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
         for (int i = 0; i < n; ++i) sum[i] = 4 * c[i] - b[i];
         put(operators.from_late, 1, 0, m.forces, k, sum, length);
     }
+    for (int i = 0; i < n; ++i) {
+        if (mode.coordinates[i] >= m.masses) continue;
+        double reach = 0;
+        for (int k = 0; k < m.forces; ++k)
+            reach += std::fabs(operators.from_late[panel_index(stride, m.forces, i, k)]);
+        operators.late_reach = std::max(operators.late_reach, reach);
+    }
     return operators;
 }
 

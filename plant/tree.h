@@ -106,6 +106,7 @@ struct TreeMode {
     double* loss = nullptr;             // power lost in the link's damper per δ²
     double* drag_loss = nullptr;        // power lost to the housing per q²
     StageMatrix matrix;                 // for the model's step size
+    double liveliness = 0;              // the most that forces of magnitude 1 can accelerate a group
     bool swings = false;                // may have swings that a step of the model's size damps noticeably
     // q = factor · z[slot], ψ = factor · z[slot]; without a shaft the factor is 0.
     int* speed_slot = nullptr;
@@ -205,6 +206,7 @@ struct TreeWork {
     const double* effort[4] = {};  // f of each stage: that of the beginning, then
     double* stage_effort[3] = {};
     double* auxiliary_rate[4] = {};  // of each stage
+    Swing swing_seen;                // by the last advance; nothing where the mode has none
 };
 std::size_t tree_work_size(const ModelData& model) noexcept;  // in doubles
 void place_tree_work(const ModelData& model, TreeWork& work, double* memory) noexcept;

@@ -199,6 +199,15 @@ void find_forces(const ModelData& m, const Mode& mode, TreeMode& t) {
         set_groups(m, t, m.force_columns[i], t.force_ratio, t.force_count, t.force_share);
         t.force[t.force_count++] = k;
     }
+    double* const share = t.matrix.inverse;  // Σ of the forces at each group; not yet in use
+    std::fill(share, share + t.paths.groups, 0.);
+    for (int i = 0; i < t.force_count; ++i) {
+        share[t.force_share.first[i]] += std::fabs(t.force_share.of_first[i]);
+        share[t.force_share.second[i]] += std::fabs(t.force_share.of_second[i]);
+    }
+    t.liveliness = 0;
+    for (int g = 0; g < t.paths.groups; ++g)
+        t.liveliness = std::max(t.liveliness, share[g] * t.inverse_mass[g]);
     for (int k = 0; k < m.meshes; ++k)
         set_groups(m, t, m.mesh_loss[static_cast<std::size_t>(k)], t.ratio, k, t.turning);
 }

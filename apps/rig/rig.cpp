@@ -1,7 +1,6 @@
 #include "apps/rig/rig.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace shiftrig::rig {
 
@@ -47,18 +46,6 @@ std::vector<bool> settable(const plant::Model& model, const io::SignalTable& sig
         result[static_cast<std::size_t>(i)] =
             i < static_cast<int>(model.inputs().size()) || signals.signal(i).name.starts_with("driver.");
     return result;
-}
-
-void accumulate(plant::Certificate& worst, const plant::Certificate& step) SHIFTRIG_REALTIME {
-    const auto larger = [](double a, double b) { return std::fabs(b) > std::fabs(a) ? b : a; };
-    worst.torque_residual = larger(worst.torque_residual, step.torque_residual);
-    worst.constraint_violation = larger(worst.constraint_violation, step.constraint_violation);
-    worst.energy_defect += step.energy_defect;
-    worst.events += step.events;
-    worst.fall_backs += step.fall_backs;
-    worst.mode_lookups += step.mode_lookups;
-    worst.mode_misses += step.mode_misses;
-    worst.flags |= step.flags;
 }
 
 }  // namespace
@@ -181,7 +168,7 @@ void Rig::step_plant() SHIFTRIG_REALTIME {
     events_not_kept_ = 0;
     for (int i = 0; i < setup_.substeps; ++i) {
         plant::step(model_, operators_, state_, inputs_, outputs_, scratch_);
-        accumulate(certificate_, outputs_.certificate);
+        add(certificate_, outputs_.certificate);
         const auto kept =
             static_cast<std::size_t>(std::min(outputs_.event_count, plant::Outputs::event_capacity));
         const std::size_t fit = std::min(kept, events_.size() - event_count_);

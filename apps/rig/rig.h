@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "apps/rig/buses.h"
+#include "apps/rig/certificate.h"
 #include "apps/rig/events.h"
 #include "apps/rig/safe_command.h"
 #include "apps/rig/timeline.h"

@@ -58,6 +58,7 @@ void Session::tick(const rt::Tick& t) SHIFTRIG_REALTIME {
     const std::int64_t ended = clock_.now();
     compute_ns_ = ended - began;
     rig_time_.record(compute_ns_);
+    certificate_.take(rig_.certificate());
     for (std::int64_t latency; rig_.buses().next_command_latency(latency);)
         command_to_signal_.record(latency);
 

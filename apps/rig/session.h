@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/rig/certificate.h"
 #include "apps/rig/collector.h"
 #include "apps/rig/rig.h"
 #include "io/recording/writer.h"
@@ -41,6 +42,8 @@ class Session {
     // From the arrival of a command on a real wire to the sending of the first frame that reflects it: of all commands
     // that one tick took, the oldest. Nothing on the in-process bus, which lives in simulated time.
     const rt::Histogram& command_to_signal() const noexcept { return command_to_signal_; }
+    // Of all ticks so far; from the loop's thread, or when run() has returned.
+    const RunCertificate& certificate() const noexcept { return certificate_; }
 
   private:
     void tick(const rt::Tick& tick) SHIFTRIG_REALTIME;
@@ -51,6 +54,7 @@ class Session {
     rt::Loop<> loop_;
     rt::SteadyClock clock_;
     rt::Histogram rig_time_, command_to_signal_;
+    RunCertificate certificate_;
     rt::Trace::Name span_tick_ = 0, span_record_ = 0;
     std::int64_t compute_ns_ = 0, started_ns_ = 0;
 };

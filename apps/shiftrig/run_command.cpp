@@ -13,6 +13,7 @@
 #include "analysis/scorecard.h"
 #include "apps/rig/session.h"
 #include "apps/rig/snapshot.h"
+#include "apps/shiftrig/certificate_report.h"
 #include "apps/shiftrig/child.h"
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/live_line.h"
@@ -188,6 +189,7 @@ void print_summary(const rig::Rig& rig, const rig::Session& session, const analy
     std::cout << describe(report) << "rig tick  " << session.rig_time().percentiles() << '\n';
     if (session.command_to_signal().count() > 0)
         std::cout << "command → signal  " << session.command_to_signal().percentiles() << '\n';
+    std::cout << describe(session.certificate(), rig.value(rig.signals().find("energy.dissipated")));
     if (!scorecard.shifts.empty()) std::cout << '\n' << analysis::to_text(scorecard);
 }
 
@@ -253,6 +255,7 @@ int run(const RunOptions& options) {
         nlohmann::json result = result_json(rig, report, collected, scorecard);
         result["loop"]["rig_tick_ns"] = to_json(session.rig_time());
         result["loop"]["command_to_signal_ns"] = to_json(session.command_to_signal());
+        result["certificate"] = to_json(session.certificate());
         result["not_granted"] = to_json(refusals);
         std::cout << result.dump() << '\n';
     } else {
@@ -260,7 +263,7 @@ int run(const RunOptions& options) {
     }
     const bool ended_well =
         report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped;
-    return whole && ended_well ? good : failed;
+    return whole && ended_well && session.certificate().is_finite() ? good : failed;
 }
 
 Command::Run declare(CLI::App& app) {

@@ -213,6 +213,29 @@ TEST(Rig, PedalReleasesTheMainClutchWhateverTheControllerSays) {
     EXPECT_NE(column(result.run, "clutch.Fc.state").back(), 0);
 }
 
+TEST(Rig, CertificateOfARunKeepsTheWorstAndCountsTheTicksOfEachFlag) {
+    RunCertificate run;
+    plant::Certificate tick;
+    tick.torque_residual = 2e-15;
+    tick.energy_defect = 3;
+    tick.mode_lookups = 2'000'000'000;
+    tick.flags = 1 | 8;
+    run.take(tick);
+    tick.torque_residual = 1e-15;
+    tick.energy_defect = -1;
+    tick.flags = 8;
+    run.take(tick);
+    EXPECT_EQ(run.torque_residual, 2e-15);
+    EXPECT_EQ(run.energy_defect, 2);
+    EXPECT_EQ(run.mode_lookups, 4'000'000'000);  // days of them
+    EXPECT_EQ(run.flagged, (std::array<std::int64_t, 4>{1, 0, 0, 2}));
+    EXPECT_TRUE(run.is_finite());
+    tick.flags = 4;
+    run.take(tick);
+    EXPECT_FALSE(run.is_finite());
+    EXPECT_EQ(run.ticks, 3);
+}
+
 TEST(Rig, ScenarioThatSetsAnOutputIsRefusedWithItsPlace) {
     try {
         make_setup({}, inline_scenario("duration_s: 1\n"));

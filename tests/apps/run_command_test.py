@@ -64,6 +64,9 @@ class BadInput(InAFolder):
         path, line = self.tractor_with("clutch_disc:  {inertia_kg_m2: 0.15", "clutch_disc:  {inertia_kg_m2: -0.15")
         self.assert_one_line(run(path), re.escape(path) + r':%d:.*mass "clutch_disc".*-0\.15; must be > 0' % line)
 
+    def test_a_scenario_in_place_of_a_model(self):
+        self.assert_one_line(run(SHIFT), "plough_upshift.yaml: .*--scenario")
+
     def test_two_shafts_without_a_mass_between_them(self):
         path, line = self.tractor_with("a: clutch_disc, b: input, stiffness", "a: clutch_disc, b: joint, stiffness")
         self.assert_one_line(run(path), re.escape(path) + ":%d:.*damper.*joint" % line)
@@ -124,6 +127,34 @@ class Results(InAFolder):
         self.assertEqual([s["to"] for s in result["shifts"]], ["F3"])
         self.assertGreater(len(result["events"]), 3)
         self.assertAlmostEqual(result["final"]["mass.vehicle.speed_m_s"] * 3.6, 8.63, delta=0.26)
+
+    def test_the_plants_certificate_of_the_whole_run(self):
+        certificate = free()["certificate"]
+        self.assertLess(abs(certificate["torque_residual"]), 1e-12)
+        self.assertLess(certificate["constraint_violation_rad_s"], 1e-10)
+        self.assertLess(abs(certificate["energy_defect_j"]), 1)
+        self.assertEqual(certificate["fall_backs"], 0)
+        self.assertGreaterEqual(certificate["events"], 2)  # F3 locks, F2 breaks away
+        self.assertGreater(certificate["modes_built"], 2)
+        self.assertEqual(certificate["ticks"],
+                         {"tie_up": 0, "direction_search_gave_up": 0, "not_finite": 0, "coarse": 0})
+        text = run("--scenario", SHIFT, "--pace", "free").stdout
+        self.assertRegex(text, r"plant +\d+ events, 0 fall-backs, \d+ modes built; torque residual \d")
+        self.assertNotIn("of 6000 ticks", text)
+
+    def test_ticks_whose_parts_stay_coarse_are_told(self):
+        # A shaft that swings 16 rad a millisecond, in parts of 8.
+        def machine_with(method):
+            machine = self.path(method + ".yaml")
+            with open(machine, "w") as file:
+                file.write("name: swing\nmethod: " + method + "\nmaximum_parts: 2\nmasses:\n"
+                           "  a: {inertia_kg_m2: 1, initial_speed_rad_s: 1}\n"
+                           "  b: {inertia_kg_m2: 1, initial_speed_rad_s: -1}\n"
+                           "shafts:\n  s: {a: a, b: b, stiffness_nm_per_rad: 1.28e8, damping_nm_s_per_rad: 0}\n")
+            return machine
+        for method in ("etd3", "ark3"):
+            text = run(machine_with(method), "--pace", "free", "--controller", "none", "--duration", "0.1").stdout
+            self.assertRegex(text, r"in \d+ of 100 ticks even the shortest parts of a step are coarse", method)
 
     def test_csv_has_every_tick_and_names_with_units(self):
         path = self.path("shift.csv")

@@ -1,7 +1,9 @@
-add_executable(ark3_test ${CMAKE_CURRENT_LIST_DIR}/ark3_test.cpp ${CMAKE_CURRENT_LIST_DIR}/random_forests.cpp)
-target_link_libraries(ark3_test PRIVATE shiftrig_plant GTest::gtest_main)
-target_compile_definitions(ark3_test PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
-gtest_discover_tests(ark3_test)
+foreach(name ark3_test ark3_accuracy_test)
+  add_executable(${name} ${CMAKE_CURRENT_LIST_DIR}/${name}.cpp ${CMAKE_CURRENT_LIST_DIR}/random_forests.cpp)
+  target_link_libraries(${name} PRIVATE shiftrig_plant GTest::gtest_main)
+  target_compile_definitions(${name} PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
+  gtest_discover_tests(${name})
+endforeach()
 
 add_executable(tree_kernels_test ${CMAKE_CURRENT_LIST_DIR}/tree_kernels_test.cpp)
 target_link_libraries(tree_kernels_test PRIVATE shiftrig_plant GTest::gtest_main)

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "rig.h"
+#include "tests/plant/ark3_chain.h"
 #include "tests/plant/random_forests.h"
 
 namespace shiftrig::plant {
@@ -227,23 +228,6 @@ TEST(Ark3, VehicleWithEngineAndTyreAgreesWithTheDenseEngine) {
 
 // ---- the choice of engine ---------------------------------------------------------------------------------
 
-Description chain(int n) {
-    Description d;
-    d.name = "chain";
-    for (int j = 0; j < n; ++j) {
-        const std::string b = "m" + std::to_string(j), a = "m" + std::to_string(j - 1);
-        d.masses.push_back(mass(b, 1 + 0.1 * (j % 7), 100));
-        if (j == 0) continue;
-        if (j % 5 == 0) {
-            d.clutches.push_back(clutch("c" + b, a, b, 300, 1.1));
-        } else {
-            d.shafts.push_back({"s" + b, a, b, 2e4, 10, 0});
-        }
-    }
-    d.sources = {source("m0", sine(200, 3))};
-    return d;
-}
-
 TEST(Ark3, IsChosenForLongChainsAndRefusedForLoops) {
     EXPECT_EQ(Model::build(chain(10)).engine(), "etd3");
     EXPECT_EQ(Model::build(chain(10)).engine_reason(), "18 speeds and twists");
@@ -268,7 +252,6 @@ TEST(Ark3, IsChosenForLongChainsAndRefusedForLoops) {
     }
 }
 
-// A clutch whose friction falls with its slip, by up to 60 rad/s² per rad/s: what is not linear.
 // Nothing acts on the chain from outside. Rounding in the solutions speeds it up by 6e-17 a step; a stage that weighed speeds by
 // numbers whose sum is not exactly 1 adds more than that.
 TEST(Ark3, MomentumOfAFreeChainStaysWhatItWas) {
@@ -286,86 +269,6 @@ TEST(Ark3, MomentumOfAFreeChainStaysWhatItWas) {
     const double before = momentum();
     for (int n = 0; n < 200000; ++n) rig.step();
     EXPECT_NEAR(momentum() / before, 1, 2e-11);
-}
-
-TEST(Ark3, IsOfThirdOrder) {
-    const auto slip = [](double h) {
-        Description d;
-        d.name = "slipping";
-        d.method = Method::ark3;
-        d.masses = {mass("a", 1, 6), mass("b", 1)};
-        d.clutches = {clutch("c", "a", "b", 100)};
-        std::get<DryFriction>(d.clutches[0].friction).falling = 0.3;
-        Rig rig(d, {h, KernelKind::automatic});
-        rig.run(0.032);
-        return rig.out("clutch.c.slip");
-    };
-    const double exact = slip(1e-4 / 4);
-    const double coarse = std::fabs(slip(2e-3) - exact), fine = std::fabs(slip(5e-4) - exact);
-    EXPECT_GT(slip(2e-3), 0.1) << "it still slips";
-    EXPECT_GT(std::log2(coarse / fine) / 2, 2.7) << coarse << " → " << fine;
-    EXPECT_LT(std::log2(coarse / fine) / 2, 3.3) << coarse << " → " << fine;
-}
-
-// What is linear is of order 4 where it swings: a locked chain with a strained shaft.
-TEST(Ark3, SwingingShaftsAreOfFourthOrder) {
-    Description d = chain(12);
-    d.method = Method::ark3;
-    d.sources.clear();
-    for (Mass& m : d.masses) m.initial_speed = 0;
-    for (Shaft& s : d.shafts) s.stiffness = 2000;
-    d.shafts[2].initial_twist = 0.05;
-    for (Clutch& c : d.clutches) {
-        c.initially_locked = true;
-        std::get<DryFriction>(c.friction).sliding_capacity = 1e9;
-    }
-    // All speeds, every 4 ms for 0.4 s.
-    const auto trace = [&](int steps) {
-        Rig rig(d, {4e-3 / steps, KernelKind::automatic});
-        std::vector<double> speeds;
-        for (int k = 0; k < 100; ++k) {
-            for (int i = 0; i < steps; ++i) rig.step();
-            speeds.insert(speeds.end(), rig.state.speeds().begin(), rig.state.speeds().end());
-        }
-        return speeds;
-    };
-    const std::vector<double> exact = trace(128);
-    const auto worst = [&](int steps) {
-        const std::vector<double> speeds = trace(steps);
-        double most = 0;
-        for (std::size_t i = 0; i < exact.size(); ++i) most = std::max(most, std::fabs(speeds[i] - exact[i]));
-        return most;
-    };
-    const double coarse = worst(2), fine = worst(16);
-    EXPECT_GT(std::log2(coarse / fine) / 3, 3.7) << coarse << " → " << fine;
-    EXPECT_LT(std::log2(coarse / fine) / 3, 4.3) << coarse << " → " << fine;
-}
-
-// Two masses on an undamped shaft. The scheme by itself would damp the swing by the ratio 0.026 (hω)³; what is left is
-// of the fifth power, and no step is so long that it would feed the swing.
-TEST(Ark3, DampsASwingByTheFifthPowerOfItsTurnAndNeverFeedsIt) {
-    const auto damping = [](double turn) {
-        const double h = 1e-3, omega = turn / h;
-        Description d;
-        d.name = "swing";
-        d.method = Method::ark3;
-        d.masses = {mass("a", 1, 1), mass("b", 1, -1)};
-        d.shafts = {{"shaft", "a", "b", omega * omega / 2, 0, 0}};
-        Rig rig(d, {h, KernelKind::automatic});
-        const auto energy = [&] {
-            const double a = rig.state.speeds()[0], b = rig.state.speeds()[1],
-                         twist = rig.out("shaft.shaft.twist");
-            return 0.5 * (a * a + b * b) + 0.25 * omega * omega * twist * twist;
-        };
-        const double from = energy();
-        const int steps = 1000;
-        for (int i = 0; i < steps; ++i) rig.step();
-        EXPECT_NEAR(rig.state.speeds()[0] + rig.state.speeds()[1], 0, 1e-12 * std::max(turn, 1.));
-        return std::log(from / energy()) / (2 * steps * turn);
-    };
-    for (const double turn : {0.05, 0.1, 0.2, 0.3})
-        EXPECT_NEAR(damping(turn), 0.0185 * std::pow(turn, 5), 0.1 * 0.0185 * std::pow(turn, 5)) << turn;
-    for (double turn = 1e-3; turn < 1e4; turn *= 1.5) EXPECT_GT(damping(turn), -1e-15 / turn) << turn;
 }
 
 }  // namespace

@@ -188,6 +188,25 @@ TEST_P(DeviceLoopsOf, SumSquares) {
     }
 }
 
+TEST_P(DeviceLoopsOf, FindTheLargestMagnitude) {
+    for (int count = 0; count <= most; ++count) {
+        const std::vector<double> a = numbers(count),
+                                  b = numbers(count);  // what stands behind them is not a number
+        double of_a = 0, of_both = 0;
+        for (int i = 0; i < count; ++i) {
+            of_a = std::max(of_a, std::fabs(a[at(i)]));
+            of_both = std::max(of_both, std::fabs(a[at(i)] - b[at(i)]));
+        }
+        EXPECT_EQ(loops.largest(a.data(), count), of_a);
+        EXPECT_EQ(loops.largest_difference(a.data(), b.data(), count), of_both);
+        for (int i = 0; i < count; ++i) {
+            std::vector<double> one(a.size(), 1);
+            one[at(i)] = i % 2 == 0 ? -3 : 3;
+            EXPECT_EQ(loops.largest(one.data(), count), 3) << i << " of " << count;
+        }
+    }
+}
+
 TEST_P(DeviceLoopsOf, HeatAsTheLawDoesAndTellWhenALimitIsPassed) {
     FacingHeat p;
     p.surface_capacity = 120;

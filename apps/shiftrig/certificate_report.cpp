@@ -1,0 +1,46 @@
+#include "apps/shiftrig/certificate_report.h"
+
+#include <fmt/format.h>
+
+namespace shiftrig::cli {
+
+namespace {
+
+struct Flag {
+    const char* key;
+    const char* text;
+};
+constexpr Flag flags[] = {
+    // by bit
+    {"tie_up", "more pairs are closed than the motion needs: how they share the torque is not unique"},
+    {"direction_search_gave_up", "no directions of power agreed with the losses"},
+    {"not_finite", "the state is not finite: nothing from there on is worth anything"},
+    {"coarse", "even the shortest parts of a step are coarse: try a shorter step or a higher maximum_parts"},
+};
+
+}  // namespace
+
+nlohmann::json to_json(const rig::RunCertificate& c) {
+    nlohmann::json ticks;
+    for (std::size_t bit = 0; bit < c.flagged.size(); ++bit) ticks[flags[bit].key] = c.flagged[bit];
+    return {{"torque_residual", c.torque_residual}, {"constraint_violation_rad_s", c.constraint_violation},
+            {"energy_defect_j", c.energy_defect},   {"events", c.events},
+            {"fall_backs", c.fall_backs},           {"mode_lookups", c.mode_lookups},
+            {"modes_built", c.mode_misses},         {"ticks", ticks}};
+}
+
+std::string describe(const rig::RunCertificate& c, double dissipated) {
+    std::string text = fmt::format(
+        "plant     {} events, {} fall-backs, {} modes built; torque residual {:.1e}, constraints {:.1e} "
+        "rad/s at most; "
+        "energy defect {:.2g} J of {:.4g} J lost\n",
+        c.events, c.fall_backs, c.mode_misses, c.torque_residual, c.constraint_violation, c.energy_defect,
+        dissipated);
+    for (std::size_t bit = 0; bit < c.flagged.size(); ++bit) {
+        if (c.flagged[bit] > 0)
+            text += fmt::format("          in {} of {} ticks {}\n", c.flagged[bit], c.ticks, flags[bit].text);
+    }
+    return text;
+}
+
+}  // namespace shiftrig::cli

@@ -1,0 +1,18 @@
+// The certificate of a run as people and programs read it.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "apps/rig/certificate.h"
+
+namespace shiftrig::cli {
+
+// {"torque_residual", "constraint_violation_rad_s", "energy_defect_j", "events", "fall_backs", "mode_lookups", "modes_built",
+// "ticks": {"tie_up", "direction_search_gave_up", "not_finite", "coarse"}}; null for what is not finite.
+nlohmann::json to_json(const rig::RunCertificate& certificate);
+
+// One line, and one for each flag that was set in some tick. `dissipated`: by the end of the run [J].
+std::string describe(const rig::RunCertificate& certificate, double dissipated);
+
+}  // namespace shiftrig::cli
