@@ -270,9 +270,8 @@ Crossing first_flank(const Work& w, const Sample& begin, const Sample& end) SHIF
 
 bool hides_contact(const Work& w) SHIFTRIG_REALTIME {
     for (const BacklashLaw& law : w.model.backlashes) {
-        if (is_flank_violated(law, flank_margin_half_way(w, law)) &&
-            !is_flank_violated(w, law, w.scratch.end()))
-            return true;
+        if (is_flank_violated(w, law, w.scratch.end())) continue;
+        if (is_flank_violated(law, flank_margin_half_way(w, law)) || may_let_go_between(w, law)) return true;
     }
     return false;
 }

@@ -89,6 +89,23 @@ double touch_between(const Work& w, const BacklashLaw& law, const Sample& begin,
     return first;
 }
 
+bool may_let_go_between(const Work& w, const BacklashLaw& law) SHIFTRIG_REALTIME {
+    const double side = flank_side(w.contact[law.device]);
+    if (side == 0) return false;
+    const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
+    const double h = end.at.time - begin.at.time;
+    const Twist from = twist_of(w.model, law, begin), half = twist_half_way(w, law),
+                to = twist_of(w.model, law, end);
+    const auto margin = [&](const Twist& t) { return closed_margin(law, side, t.angle, t.rate); };
+    const double least = std::min({margin(from), margin(half), margin(to)});
+    // Angle and rate half way, exact and by the cubic through both ends. A whole turn of a swing shows in the rate alone, as three
+    // times its angle over h.
+    const double angle = 0.5 * (from.angle + to.angle) + h / 8 * (from.rate - to.rate);
+    const double rate = 1.5 * (to.angle - from.angle) / h - 0.25 * (from.rate + to.rate);
+    const double unseen = 8 * std::fabs(half.angle - angle) + h * std::fabs(half.rate - rate);
+    return law.stiffness * (unseen - 1e-5 * law.half_gap) > least + flank_rounding(law);
+}
+
 bool flanks_hold(const Work& w, const Sample& end) SHIFTRIG_REALTIME {
     for (const BacklashLaw& law : w.model.backlashes) {
         if (is_flank_violated(w, law, end)) return false;

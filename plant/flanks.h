@@ -42,6 +42,10 @@ double touch_between(const Work& work, const BacklashLaw& law, const Sample& beg
                      const Sample& end) SHIFTRIG_REALTIME;
 bool flanks_hold(const Work& work, const Sample& end) SHIFTRIG_REALTIME;
 
+// May a closed flank let go and press again between the samples of the part? What the cubic through both ends does not show of the
+// twist would be enough for it.
+bool may_let_go_between(const Work& work, const BacklashLaw& law) SHIFTRIG_REALTIME;
+
 // Strain of a flank that opens is lost in its damper; what it has where it closes, by as much as that is beside the
 // very instant, is booked with its sign.
 void change_flank(Work& work, const BacklashLaw& law, Sample& sample) SHIFTRIG_REALTIME;

@@ -39,7 +39,8 @@ Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end
 // The same among flanks alone.
 Crossing first_flank(const Work& work, const Sample& begin, const Sample& end) SHIFTRIG_REALTIME;
 
-// Has a flank closed or opened half way that at the end is as it was? The part is too long for it.
+// Has a flank closed or opened half way that at the end is as it was, or may one have done so between? The part is too long
+// for it.
 bool hides_contact(const Work& work) SHIFTRIG_REALTIME;
 
 // Where between begin and end the margin of a device that holds at both is so small that it may have been negative:

@@ -1,4 +1,4 @@
-foreach(name ark3_test ark3_accuracy_test)
+foreach(name ark3_test ark3_accuracy_test portable_bits_test)
   add_executable(${name} ${CMAKE_CURRENT_LIST_DIR}/${name}.cpp ${CMAKE_CURRENT_LIST_DIR}/random_forests.cpp)
   target_link_libraries(${name} PRIVATE shiftrig_plant GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")

@@ -30,6 +30,9 @@ target_link_libraries(library_examples_test PRIVATE shiftrig_comparison GTest::g
 target_compile_definitions(library_examples_test PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
 gtest_discover_tests(library_examples_test)
 
+if(SHIFTRIG_PLANT_ONLY)
+  return()
+endif()
 # Very many steps by hand: shiftrig_long_run --steps 100000000 --parked 10000000
 add_executable(shiftrig_long_run plant/long_run_main.cpp)
 target_link_libraries(shiftrig_long_run PRIVATE shiftrig_plant shiftrig_model)
