@@ -9,7 +9,8 @@
 namespace shiftrig::plant {
 namespace {
 
-enum class Contact { locked, slipping, alternating, swinging };  // swinging: locked, the torque turns round
+// The last two: locked, the torque turns round, and with 20 times as much, so that steps are taken in parts.
+enum class Contact { locked, slipping, alternating, swinging, swinging_hard };
 
 Description chain(int n, Contact contact) {
     Description d;
@@ -39,7 +40,7 @@ Description chain(int n, Contact contact) {
         } else if (j > 0) {
             d.shafts.push_back({"s" + b, a, b, 2e4, 10, 0});
         }
-        const bool together = contact == Contact::locked || contact == Contact::swinging;
+        const bool together = contact != Contact::slipping && contact != Contact::alternating;
         mass.initial_speed = together ? 100 : 100 - 2 * clutches;
         d.masses.push_back(mass);
     }
@@ -61,10 +62,11 @@ void step_chain(benchmark::State& bench, Contact contact, Method method) {
     Outputs outputs(model);
     Scratch scratch(model);
     double& torque = inputs.value[static_cast<std::size_t>(model.input("source.drive.torque"))];
-    torque = 50;
+    torque = contact == Contact::swinging_hard ? 1000 : 50;
+    const bool turns = contact == Contact::swinging || contact == Contact::swinging_hard;
     unsigned steps = 0;
     for (auto _ : bench) {
-        if (contact == Contact::swinging && ++steps % 16 == 0) torque = -torque;
+        if (turns && ++steps % 16 == 0) torque = -torque;
         step(model, operators, state, inputs, outputs, scratch);
     }
     bench.SetLabel(std::string(model.engine()) + " " + std::string(model.kernel()));
@@ -94,6 +96,10 @@ BENCHMARK_CAPTURE(step_chain, alternating, Contact::alternating, Method::automat
     ->Arg(200)
     ->Arg(1000);
 BENCHMARK_CAPTURE(step_chain, swinging, Contact::swinging, Method::automatic)->Arg(50)->Arg(200)->Arg(1000);
+BENCHMARK_CAPTURE(step_chain, swinging_hard, Contact::swinging_hard, Method::automatic)
+    ->Arg(50)
+    ->Arg(200)
+    ->Arg(1000);
 BENCHMARK_CAPTURE(step_chain, locked_ark3, Contact::locked, Method::ark3)->Arg(2)->Arg(10)->Arg(20);
 BENCHMARK_CAPTURE(step_chain, locked_etd3, Contact::locked, Method::etd3)->Arg(20)->Arg(50);
 

@@ -102,8 +102,10 @@ bool may_let_go_between(const Work& w, const BacklashLaw& law) SHIFTRIG_REALTIME
     // times its angle over h.
     const double angle = 0.5 * (from.angle + to.angle) + h / 8 * (from.rate - to.rate);
     const double rate = 1.5 * (to.angle - from.angle) / h - 0.25 * (from.rate + to.rate);
-    const double unseen = 8 * std::fabs(half.angle - angle) + h * std::fabs(half.rate - rate);
-    return law.stiffness * (unseen - 1e-5 * law.half_gap) > least + flank_rounding(law);
+    const double unseen_rate = std::fabs(half.rate - rate);
+    const double unseen = 8 * std::fabs(half.angle - angle) + h * unseen_rate;
+    return law.stiffness * (unseen - 1e-5 * law.half_gap) + law.damping * unseen_rate >
+           least + flank_rounding(law);
 }
 
 bool flanks_hold(const Work& w, const Sample& end) SHIFTRIG_REALTIME {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "plant/ark3.h"
+#include "plant/devices.h"
 #include "plant/modes.h"
 
 namespace shiftrig::plant::detail {
@@ -12,6 +13,7 @@ namespace {
 // Of the largest torque, of the largest speed, of the way that the fastest mass turns.
 constexpr double force_tolerance = 2e-5, swing_tolerance = 2e-5, speed_tolerance = 1e-6,
                  twist_tolerance = 3e-6;
+constexpr double rounding = 1e-9;  // of the torques in shafts: by so much they differ where nothing swings
 
 // Is this more than so much of the largest torque? That the forces are among these mostly settles it.
 bool exceeds(const Work& w, double torque, double share) {
@@ -45,16 +47,17 @@ bool hides_swing(const Work& w) {
     const ModelData& m = w.model;
     const Sample &begin = w.scratch.begin(), &half = w.scratch.half, &end = w.scratch.end();
     const double h = end.at.time - begin.at.time;
-    double hidden = 0;
+    double hidden = 0, strain = 0;
     for (int e = 0; e < m.twists; ++e) {
         const auto& links = m.shaft_rate[static_cast<std::size_t>(e)];
         const int i = m.masses + e;
         const double cubic =
             0.5 * (begin.z[i] + end.z[i]) + h / 8 * (slip_fast(links, begin.z) - slip_fast(links, end.z));
-        hidden = std::max(hidden, m.structure.shafts[static_cast<std::size_t>(e)].stiffness *
-                                      std::fabs(half.f[e - m.twists] - cubic));
+        const double stiffness = m.structure.shafts[static_cast<std::size_t>(e)].stiffness;
+        hidden = std::max(hidden, stiffness * std::fabs(half.f[e - m.twists] - cubic));
+        strain = std::max(strain, stiffness * std::fabs(end.z[i]));
     }
-    return exceeds(w, hidden, swing_tolerance);
+    return hidden > rounding * strain && exceeds(w, hidden, swing_tolerance);
 }
 
 bool is_dense_coarse(Work& w, const Mode& mode) {
@@ -75,7 +78,18 @@ bool is_dense_coarse(Work& w, const Mode& mode) {
     return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || hides_swing(w);
 }
 
-// Along the tree shafts are not exact: the embedded method says how near they are.
+// Along the tree shafts are not exact: the embedded method says how near they are. Where all stand still it says what rounding does.
+bool swings_between(const Work& w, const Mode& mode) {
+    const DeviceLoops& loops = w.model.kernel.loops;
+    const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
+    const Swing& seen = w.scratch.tree.swing_seen;
+    const double h = end.at.time - begin.at.time;
+    if (!(seen.error > twist_tolerance * h * std::max(seen.fastest, at_rest))) return false;
+    const TreePaths& paths = mode.tree->paths;
+    return seen.error * loops.largest(paths.stiffness, paths.groups) >
+           rounding * loops.largest(end.groups.passed, paths.groups);
+}
+
 bool is_tree_coarse(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
     const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
@@ -89,10 +103,11 @@ bool is_tree_coarse(Work& w, const Mode& mode) {
         std::fill(v.load, v.load + t.paths.groups, 0.);
         m.tree->kernel.give({t.force_share, t.force, t.force_count, 1, {difference}, {weight}},
                             t.inverse_mass, v.load);
-        return m.kernel.loops.largest(v.load, t.paths.groups);
+        double* const of_mass = w.scratch.vector_b;
+        m.tree->kernel.spread(t.mass_group, t.mass_ratio, v.load, m.masses, of_mass);
+        return m.kernel.loops.largest(of_mass, m.masses);
     };
-    return v.swing_seen.error > twist_tolerance * h * v.swing_seen.fastest ||
-           takes_forces_amiss(w, late, weight * t.liveliness, change);
+    return swings_between(w, mode) || takes_forces_amiss(w, late, weight * t.liveliness, change);
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 namespace shiftrig::plant::detail {
 
 // After advance(): do shafts swing within the part, or do forces that depend on the motion change so fast, that
-// its few samples do not show it? Linear motion is exact at any length; finding the instants at which contacts change
-// is not, nor are forces taken from the stages.
+// its few samples do not show it? The exponential step takes linear motion exactly at any length, but not the instants at which
+// contacts change, nor forces taken from the stages; that along the tree does not take swings exactly either.
 bool is_coarse(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
 // Where between begin and end the first slip comes upon a knot of its friction table, beyond which the part's few samples

@@ -69,7 +69,8 @@ struct StepOperators {
     double* from_begin = nullptr;  // [P_h Q_h; P −Q_1; P Q_1−3Q_2+4Q_3]   three blocks × (order + forces)
     double* from_half = nullptr;   // [2Q_1; 4Q_2−8Q_3]                    two blocks × forces
     double* from_late = nullptr;   // 4Q_3−Q_2                             one block × forces
-    double late_reach = 0;         // the most that forces of magnitude 1 can change a speed by that last way
+    double late_reach =
+        0;  // the most that forces of magnitude 1 change a speed among the coordinates by that last way
     double* middle =
         nullptr;  // [(h/2)(2φ_2 − 2φ_3) S̃, (h/2)(φ_3 − φ_2/2) S̃], φ_k(hL/2)   one block × 2 forces
 };

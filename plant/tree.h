@@ -106,7 +106,7 @@ struct TreeMode {
     double* loss = nullptr;             // power lost in the link's damper per δ²
     double* drag_loss = nullptr;        // power lost to the housing per q²
     StageMatrix matrix;                 // for the model's step size
-    double liveliness = 0;              // the most that forces of magnitude 1 can accelerate a group
+    double liveliness = 0;              // the most that forces of magnitude 1 can accelerate a mass
     bool swings = false;                // may have swings that a step of the model's size damps noticeably
     // q = factor · z[slot], ψ = factor · z[slot]; without a shaft the factor is 0.
     int* speed_slot = nullptr;

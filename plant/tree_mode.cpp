@@ -205,9 +205,13 @@ void find_forces(const ModelData& m, const Mode& mode, TreeMode& t) {
         share[t.force_share.first[i]] += std::fabs(t.force_share.of_first[i]);
         share[t.force_share.second[i]] += std::fabs(t.force_share.of_second[i]);
     }
+    double* const widest = t.matrix.lower;  // r of the masses of each group; likewise
+    std::fill(widest, widest + t.paths.groups, 0.);
+    for (int p = 0; p < m.masses; ++p)
+        widest[t.group[p]] = std::max(widest[t.group[p]], std::fabs(t.ratio[p]));
     t.liveliness = 0;
     for (int g = 0; g < t.paths.groups; ++g)
-        t.liveliness = std::max(t.liveliness, share[g] * t.inverse_mass[g]);
+        t.liveliness = std::max(t.liveliness, widest[g] * share[g] * t.inverse_mass[g]);
     for (int k = 0; k < m.meshes; ++k)
         set_groups(m, t, m.mesh_loss[static_cast<std::size_t>(k)], t.ratio, k, t.turning);
 }

@@ -20,9 +20,11 @@ constexpr Flag flags[] = {
 
 }  // namespace
 
-nlohmann::json to_json(const rig::RunCertificate& c) {
+nlohmann::json to_json(const rig::RunCertificate& c, const plant::Description& machine) {
     nlohmann::json ticks;
     for (std::size_t bit = 0; bit < c.flagged.size(); ++bit) ticks[flags[bit].key] = c.flagged[bit];
+    const bool divides = machine.transition == plant::Transition::localised && machine.maximum_parts > 1;
+    if (!divides) ticks["coarse"] = nullptr;
     return {{"torque_residual", c.torque_residual}, {"constraint_violation_rad_s", c.constraint_violation},
             {"energy_defect_j", c.energy_defect},   {"events", c.events},
             {"fall_backs", c.fall_backs},           {"mode_lookups", c.mode_lookups},

@@ -9,10 +9,11 @@
 namespace shiftrig::cli {
 
 // {"torque_residual", "constraint_violation_rad_s", "energy_defect_j", "events", "fall_backs", "mode_lookups", "modes_built",
-// "ticks": {"tie_up", "direction_search_gave_up", "not_finite", "coarse"}}; null for what is not finite.
-nlohmann::json to_json(const rig::RunCertificate& certificate);
+// "ticks": {"tie_up", "direction_search_gave_up", "not_finite", "coarse"}}; null for what is not finite, and for `coarse` where
+// the machine's steps are taken whole, whatever happens in them.
+nlohmann::json to_json(const rig::RunCertificate& certificate, const plant::Description& machine);
 
-// One line, and one for each flag that was set in some tick. `dissipated`: by the end of the run [J].
+// One line, and one for each flag that was set in some tick. `dissipated`: in this run [J].
 std::string describe(const rig::RunCertificate& certificate, double dissipated);
 
 }  // namespace shiftrig::cli

@@ -180,7 +180,12 @@ bool finish(const RunOptions& options, Beside& beside) {
     return whole;
 }
 
-void print_summary(const rig::Rig& rig, const rig::Session& session, const analysis::Scorecard& scorecard) {
+double dissipated(const rig::Rig& rig) {  // since the machine's start [J]
+    return rig.value(rig.signals().find("energy.dissipated"));
+}
+
+void print_summary(const rig::Rig& rig, const rig::Session& session, double dissipated_before,
+                   const analysis::Scorecard& scorecard) {
     const rt::LoopReport& report = session.report();
     const double wall = static_cast<double>(report.ended - report.began) * 1e-9;
     std::printf("%lld ticks, %.6g s simulated in %.3g s (%.3g times real time)\n",
@@ -189,7 +194,7 @@ void print_summary(const rig::Rig& rig, const rig::Session& session, const analy
     std::cout << describe(report) << "rig tick  " << session.rig_time().percentiles() << '\n';
     if (session.command_to_signal().count() > 0)
         std::cout << "command → signal  " << session.command_to_signal().percentiles() << '\n';
-    std::cout << describe(session.certificate(), rig.value(rig.signals().find("energy.dissipated")));
+    std::cout << describe(session.certificate(), dissipated(rig) - dissipated_before);
     if (!scorecard.shifts.empty()) std::cout << '\n' << analysis::to_text(scorecard);
 }
 
@@ -227,6 +232,7 @@ int run(const RunOptions& options) {
         if (taker) taker->offer(each);
     };
     rig::Session session(rig, std::move(session_options));
+    const double dissipated_before = dissipated(rig);
 
     std::optional<Child> controller;
     if (const auto command = rig::controller_command(options.choices); !command.empty()) {
@@ -255,11 +261,11 @@ int run(const RunOptions& options) {
         nlohmann::json result = result_json(rig, report, collected, scorecard);
         result["loop"]["rig_tick_ns"] = to_json(session.rig_time());
         result["loop"]["command_to_signal_ns"] = to_json(session.command_to_signal());
-        result["certificate"] = to_json(session.certificate());
+        result["certificate"] = to_json(session.certificate(), rig.setup().model.description);
         result["not_granted"] = to_json(refusals);
         std::cout << result.dump() << '\n';
     } else {
-        print_summary(rig, session, scorecard);
+        print_summary(rig, session, dissipated_before, scorecard);
     }
     const bool ended_well =
         report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped;

@@ -137,10 +137,19 @@ class Results(InAFolder):
         self.assertGreaterEqual(certificate["events"], 2)  # F3 locks, F2 breaks away
         self.assertGreater(certificate["modes_built"], 2)
         self.assertEqual(certificate["ticks"],
-                         {"tie_up": 0, "direction_search_gave_up": 0, "not_finite": 0, "coarse": 0})
+                         {"tie_up": 0, "direction_search_gave_up": 0, "not_finite": 0, "coarse": None})  # steps are taken whole
         text = run("--scenario", SHIFT, "--pace", "free").stdout
         self.assertRegex(text, r"plant +\d+ events, 0 fall-backs, \d+ modes built; torque residual \d")
         self.assertNotIn("of 6000 ticks", text)
+
+    def test_the_energy_of_the_certificate_is_that_of_this_run(self):
+        snapshot = self.path("s.snap")
+        free("--snapshot-at", "5", snapshot)
+        pattern = r"energy defect \S+ J of (\S+) J lost"
+        whole = float(re.search(pattern, run("--scenario", SHIFT, "--pace", "free").stdout)[1])
+        rest = float(re.search(pattern, run("--from", snapshot, "--pace", "free").stdout)[1])
+        self.assertGreater(rest, 0.1 * whole)  # a sixth of the time
+        self.assertLess(rest, 0.25 * whole)
 
     def test_ticks_whose_parts_stay_coarse_are_told(self):
         # A shaft that swings 16 rad a millisecond, in parts of 8.
