@@ -1,5 +1,6 @@
 // Valves, pistons and pedals over one step. They do not feel the mechanics, so they are advanced first.
 #include <algorithm>
+#include <limits>
 #include <span>
 
 #include "plant/few.h"
@@ -69,10 +70,13 @@ void advance_valve_and_piston(Work& w, int pair, double pump_share) noexcept {
 bool is_quiet(const Work& w, int pair) noexcept {
     const auto i = static_cast<std::size_t>(pair);
     const PairLaw& law = w.model.pair_laws[i];
-    const PairCommand& command = w.operators.commands[i];
-    return !law.hydraulic->solenoid && !command.valve_held &&
-           is_quiet(*law.hydraulic, w.next[law.actuator + steady_slot], read_hydraulic(w.next + law.actuator),
-                    static_cast<std::size_t>(law.delay_slots), command.target);
+    const double rest = w.operators.commands[i].rest;
+    double* const at = w.next + law.actuator;
+    if (at[chamber_slot] != rest) return false;
+    if (at[steady_slot] > law.delay_slots) return true;
+    if (!is_quiet(read_hydraulic(at), static_cast<std::size_t>(law.delay_slots), rest)) return false;
+    at[steady_slot] = law.delay_slots + 1;
+    return true;
 }
 
 }  // namespace
@@ -102,6 +106,9 @@ void latch_commands(Work& w) SHIFTRIG_REALTIME {
             case LoadSource::hydraulic:
                 command.scale = 1 - input(w, law.leak);
                 command.valve_held = input(w, law.valve_stuck) > 0.5;
+                command.rest = law.hydraulic->solenoid || command.valve_held
+                                   ? std::numeric_limits<double>::quiet_NaN()
+                                   : limited_command(*law.hydraulic, command.target);
                 load = load_from_pressure(law.friction, command.target * command.scale);
                 break;
             default:

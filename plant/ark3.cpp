@@ -106,42 +106,37 @@ constexpr Impulse embedded_impulse() {
 }
 constexpr Impulse swing_impulse = embedded_impulse();
 
-// What so many stages make of an impulse, and of the ways with these weights.
-StageSums stage_sums(const Impulse& impulse, const double (&ways)[stages], int count, const GroupState& begin,
-                     const TreeWork& v, double h) {
-    StageSums sums;
-    sums.count = count;
-    for (int j = 0; j < count; ++j) {
-        sums.speed[j] = j == 0 ? begin.speed : v.speed[j - 1];
-        sums.of_momentum[j] = impulse.speed[j];
-        sums.of_way[j] = h * ways[j];
+// What the explicit part of the last stage lacks of the end.
+struct Lacks {
+    double share[stages] = {};
+    constexpr Lacks() {
+        for (int j = 0; j < stages; ++j) share[j] = weights[j] - explicit_table[stages - 1][j];
     }
-    sums.net = begin.net;
-    sums.of_net = h * impulse.net;
-    return sums;
+};
+constexpr Lacks lacks;
+
+// What so many stages make of an impulse, and of the ways with these weights.
+StageSums stage_sums(const Impulse& impulse, const double (&ways)[stages], int count, const double* net,
+                     const TreeWork& v, double h) {
+    return {count, v.speed, impulse.speed, ways, h, net, h * impulse.net};
 }
 
 // What the forces of so many stages take from the groups: −h Σ share_j Q_j.
-Efforts efforts(const TreeMode& t, const double (&shares)[stages], int count, const TreeWork& v, double h) {
-    Efforts all{t.force_share, t.force, t.force_count, count, {}, {}};
-    for (int j = 0; j < count; ++j) {
-        all.effort[j] = v.effort[j];
-        all.weight[j] = -h * shares[j];
-    }
-    return all;
+Efforts efforts(const double (&shares)[stages], int count, const TreeWork& v, double h) {
+    return {count, v.effort, shares, -h};
 }
 
 // Where shafts swing, makes the linear part of the step one of order 4. hL/(1 − hγL)² in place of hL: the same to that
 // order, nothing where hω is large, and the step stays L-stable. With S = (1 − hγL)⁻¹, which a stage solves with,
 // it is (S² − S)/γ.
 void complete_swing(const ModelData& m, const TreeMode& t, TreeWork& v, double h, const StageMatrix& stage,
-                    const GroupState& begin, GroupState& end) {
+                    const double* net, GroupState& end) {
     const TreeKernel& kernel = m.tree->kernel;
-    const StageSums sums = stage_sums(swing_impulse, embedded_error, stages, begin, v, h);
+    const StageSums sums = stage_sums(swing_impulse, embedded_error, stages, net, v, h);
     const Swing swing = v.swing_seen = kernel.swing_error(t.paths, sums, v.way);
     if (!(swing.error > ark3_swing_tolerance * h * std::max(swing.fastest, at_rest))) return;
     kernel.combine(t.paths, sums, v.momentum, v.way);
-    kernel.give(efforts(t, swing_impulse.effort, stages, v, h), nullptr, v.momentum);
+    kernel.give(t.forces, efforts(swing_impulse.effort, stages, v, h), nullptr, v.momentum);
     constexpr double factor = -excess / embedded / gamma;
     kernel.correct(t.paths, stage, v.momentum, v.way, factor,
                    {v.swing[0], v.swing[1], v.swing[2], v.swing[3]}, end.speed, end.twist);
@@ -176,14 +171,16 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
 
     tabulate_contact(w, mode);
     const GroupState& start = groups_of(w, mode, begin);
+    v.speed[0] = start.speed;
     v.effort[0] = begin.f;
     Sample& late = s.late;  // of each stage in turn, its f kept
     copy_few(begin.auxiliary_rate, m.auxiliary, v.auxiliary_rate[0]);
     for (int i = 1; i < stages; ++i) {
-        kernel.combine(t.paths, stage_sums(impulses.star[i], implicit_table[i], i, start, v, h), v.momentum,
-                       v.way);
-        kernel.give(efforts(t, impulses.star[i].effort, i, v, h), nullptr, v.momentum);
-        double* const speed = v.speed[i - 1];
+        kernel.combine(t.paths, stage_sums(impulses.star[i], implicit_table[i], i, start.net, v, h),
+                       v.momentum, v.way);
+        kernel.give(t.forces, efforts(impulses.star[i].effort, i, v, h), nullptr, v.momentum);
+        double* const speed = v.stage_speed[i - 1];
+        v.speed[i] = speed;
         kernel.solve(t.paths, matrix, v.momentum, {start.twist, v.way}, speed);
 
         const bool last = i == stages - 1;
@@ -202,20 +199,18 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
 
     // The implicit table ends with b: the last stage needs only what its explicit part lacks.
     GroupState& groups = end.groups;
-    kernel.finish(t.paths, {start.twist, v.way}, matrix.weight, v.speed[stages - 2], groups.speed,
+    kernel.finish(t.paths, {start.twist, v.way}, matrix.weight, v.speed[stages - 1], groups.speed,
                   groups.twist);
-    double lacks[stages];
-    for (int j = 0; j < stages; ++j) lacks[j] = weights[j] - explicit_table[stages - 1][j];
-    kernel.give(efforts(t, lacks, stages, v, h), t.inverse_mass, groups.speed);
+    kernel.give(t.forces, efforts(lacks.share, stages, v, h), t.inverse_mass, groups.speed);
     v.swing_seen = {};
-    if (t.swings) complete_swing(m, t, v, h, matrix, start, groups);
+    if (t.swings) complete_swing(m, t, v, h, matrix, start.net, groups);
     for (int a = 0; a < m.auxiliary; ++a) {
         double change = 0;
         for (int j = 0; j < stages; ++j) change += weights[j] * v.auxiliary_rate[j][a];
         end.auxiliary[a] = begin.auxiliary[a] + h * change;
     }
-    kernel.spread(t.mass_group, t.mass_ratio, groups.speed, m.masses, end.z);
-    kernel.spread(t.shaft_group, t.shaft_ratio, groups.twist, m.twists, end.z + m.masses);
+    kernel.spread(t.masses, groups.speed, m.masses, end.z);
+    kernel.spread(t.shafts, groups.twist, m.twists, end.z + m.masses);
     if (!t.exact) read_groups(t, end.z, groups);  // as the next step would, if it had to
     group_slips(m, mode, groups.speed, end);
     end.at = {w.start + end_fraction * w.h, end_fraction, Side::left};

@@ -77,11 +77,24 @@ struct ShaftValues {
     int count = 0;
 };
 
+// Power through so many meshes.
+struct MeshFlow {
+    const double* torque = nullptr;     // on the first link
+    const double* direction = nullptr;  // of the lossy ones: x, 0 at rest
+    const double* checked = nullptr;    // not 0 where a mesh has losses and moves
+    int meshes = 0;
+};
+
 struct DeviceLoops {
     // Has every speed at the end the sense it is to have?
     bool (*senses_hold)(const SpeedCheck& check) SHIFTRIG_REALTIME = nullptr;
     // May one have been least somewhere between begin and end?
     bool (*may_dip)(const SpeedCheck& check) SHIFTRIG_REALTIME = nullptr;
+    // Does every pair run free (state_code 2) that nothing presses together, and no other?
+    bool (*pressed_engage)(const double* sliding, const double* holding, const double* state_code,
+                           int pairs) SHIFTRIG_REALTIME = nullptr;
+    // Has power turned round in a mesh, by no less torque than this, since it was told?
+    bool (*some_turned)(const MeshFlow& flow, const double* told, double torque) SHIFTRIG_REALTIME = nullptr;
     // Forces of the pairs: drag · slip, slip within ± drag_limit, and sense · load · factor.
     void (*slide)(const FrictionTerms& terms, double* f) SHIFTRIG_REALTIME = nullptr;
     // The same, and what each holds and passes: load · static_factor, load · factor.

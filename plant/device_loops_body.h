@@ -1,19 +1,11 @@
 // The loops of device_loops.h for whatever registers an including file has: that defines `lanes`, the doubles of one
-// register, then includes this inside its own namespace.
+// register, includes lanes_body.h, defines any(marks), whether a bit is set, and joined(v, join), the two halves of v joined
+// until one number is left, then includes this, all inside its own namespace.
 //
 // Comparisons are written so that what is not a number counts as no violation, and what stands behind an array as nothing.
 
-#include "plant/lanes_body.h"
-
-inline bool any(const Marks& marks) noexcept {
-    std::int64_t all = 0;
-    for (int i = 0; i < lanes; ++i) all |= marks[i];
-    return all != 0;
-}
 inline double sum(const Lanes& v) noexcept {
-    double total = v[0];
-    for (int i = 1; i < lanes; ++i) total += v[i];
-    return total;
+    return joined(v, [](const auto& a, const auto& b) { return a + b; });
 }
 // The largest whole numbers not above v, |v| < 2^51.
 inline Lanes whole_below(const Lanes& v) noexcept {
@@ -37,6 +29,25 @@ bool may_dip(const SpeedCheck& c) SHIFTRIG_REALTIME {
         close |= (4. * gm - 3. * g0 - g1 < 0) & (g0 - 4. * gm + 3. * g1 > 0) & (g1 > 0);
     }
     return any(close);
+}
+
+bool pressed_engage(const double* sliding, const double* holding, const double* state_code,
+                    int pairs) SHIFTRIG_REALTIME {
+    Marks wrong = {};
+    for (int k = 0; k < pairs; k += lanes) {
+        const Marks pressed = (read(sliding + k) > 0) | (read(holding + k) > 0);
+        wrong |= ~(pressed ^ (read(state_code + k) == 2.)) & first_of(pairs - k);
+    }
+    return !any(wrong);
+}
+
+bool some_turned(const MeshFlow& m, const double* told, double torque) SHIFTRIG_REALTIME {
+    Marks turned = {};
+    for (int k = 0; k < m.meshes; k += lanes) {
+        turned |= (read(m.checked + k) != 0) & (read(told + k) != read(m.direction + k)) &
+                  (magnitude(read(m.torque + k)) >= torque) & first_of(m.meshes - k);
+    }
+    return any(turned);
 }
 
 // math/elementary.h's, bit for bit, of what is not above 0.
@@ -118,14 +129,7 @@ inline double largest_of(int count, const Value& value) noexcept {
         other = larger(magnitude(value(i + lanes)), other);
     }
     for (; i < count; i += lanes) most = larger(where(first_of(count - i), magnitude(value(i))), most);
-    most = larger(other, most);
-    double largest[lanes];
-    write(largest, most);
-    for (int half = lanes / 2; half > 0; half /= 2) {
-        for (int j = 0; j < half; ++j)
-            largest[j] = largest[j + half] > largest[j] ? largest[j + half] : largest[j];
-    }
-    return largest[0];
+    return joined(larger(other, most), [](const auto& a, const auto& b) { return b > a ? b : a; });
 }
 
 double largest(const double* v, int count) SHIFTRIG_REALTIME {
@@ -251,5 +255,6 @@ double* show_shafts(const ShaftValues& s, double* next) SHIFTRIG_REALTIME {
 }
 
 constexpr DeviceLoops device_loops{
-    senses_hold,      may_dip,         slide, press, book, subtract, largest,       largest_difference,
-    share_of_squares, weighted_square, same,  copy,  heat, pick_up,  show_clutches, show_shafts};
+    senses_hold, may_dip, pressed_engage,     some_turned,      slide,           press, book,
+    subtract,    largest, largest_difference, share_of_squares, weighted_square, same,  copy,
+    heat,        pick_up, show_clutches,      show_shafts};

@@ -74,10 +74,8 @@ bool goes_beyond_loss(const Work& w, const Mode& mode, const Sample& s) {
 
 // Would settling let a pair go that nothing presses any more, or engage one?
 bool engages_or_releases(const Work& w, const Sample& s) {
-    bool found = false;
-    for (int k = 0; k < w.model.pairs; ++k)
-        found |= (s.sliding[k] > 0 || s.holding[k] > 0) == (w.contact[k] == free_running);
-    return found;
+    const ModelData& m = w.model;
+    return !m.kernel.loops.pressed_engage(s.sliding, s.holding, w.operators.table.state_code, m.pairs);
 }
 
 void reset(Outputs& outputs, ScratchData& scratch, int forces) {
@@ -212,7 +210,10 @@ void report_changes(Work& w, const Mode& mode) {
     double* const told = w.next + m.layout.drive_sides;
     const double* const direction = w.operators.table.direction;
     const double* const torque = s.torque + m.pairs;
-    for (const int k : m.lossy_meshes) {
+    const MeshFlow flow{torque, direction, w.operators.table.drive, m.meshes};
+    const bool turned = m.kernel.loops.some_turned(flow, told, m.noteworthy_torque);
+    for (int i = 0, count = turned ? static_cast<int>(m.lossy_meshes.size()) : 0; i < count; ++i) {
+        const int k = m.lossy_meshes[static_cast<std::size_t>(i)];
         const double x = direction[k];
         if (told[k] == x || x == 0 || std::fabs(torque[k]) < m.noteworthy_torque) continue;
         if (told[k] != 0) log_event(w, EventKind::drive_side, m.pairs + k, end, torque[k], 0, x);

@@ -51,16 +51,18 @@ FrictionTerms friction_terms(const Work& w, const double* load, const Sample& s)
 }
 
 // Of pairs loaded by nature: what loads them is known after the laws.
-void natural_forces(const Work& w, Sample& s) noexcept {
+void natural_forces(const Work& w, Sample& s, bool complete) noexcept {
     const ModelData& m = w.model;
     const ContactTable& table = w.operators.table;
-    for (int k = m.actuated_pairs; k < m.pairs; ++k) {
+    for (int k = m.actuated_pairs, pairs = m.pairs; k < pairs; ++k) {
         const auto i = static_cast<std::size_t>(k);
         const double factor =
             table.rise[k] == 0 ? table.base[k] : sliding_factor(m.pair_laws[i].friction, s.slip[k]);
-        s.holding[k] = s.load[k] * m.static_factor[i];
-        s.sliding[k] = s.load[k] * factor;
-        s.f[k] = table.sense[k] * s.sliding[k];
+        const double load = s.load[k], sliding = load * factor;
+        s.f[k] = table.sense[k] * sliding;
+        if (!complete) continue;
+        s.sliding[k] = sliding;
+        s.holding[k] = load * m.static_factor[i];
     }
 }
 
@@ -104,6 +106,21 @@ void bearing_forces(const Work& w, const unsigned char* contact, Sample& s) noex
                      ? 0
                      : motion_sign(state) * (state & driven ? mesh.backward_bearing : mesh.forward_bearing);
     }
+}
+
+// What few machines have.
+void rare_forces(const Work& w, const unsigned char* contact, Sample& s) noexcept {
+    weak_forces(w, contact, s);
+    flank_forces(w, contact, s);
+    bearing_forces(w, contact, s);
+}
+
+// Once the laws are known: what the loop over actuated pairs leaves out.
+void further_forces(const Work& w, Sample& s, bool complete) noexcept {
+    if (w.model.actuated_pairs < w.model.pairs) natural_forces(w, s, complete);
+    if (!w.model.rare_forces) return;
+    tabled_forces(w, s, complete);
+    rare_forces(w, w.contact, s);
 }
 
 }  // namespace
@@ -165,7 +182,7 @@ void load_pairs(const Work& w, Sample& s) noexcept {
 const double* stage_loads(const Work& w, Sample& s) noexcept {
     const ModelData& m = w.model;
     const double* const held = w.scratch.held.data();
-    if (w.scratch.moving_count > 0 || !m.tabled_pairs.empty() || !m.one_way_pairs.empty()) {
+    if (w.scratch.moving_count > 0 || m.rare_forces) {
         load_pairs(w, s);
         return s.load;
     }
@@ -255,9 +272,7 @@ void evaluate_forces(const Work& w, const unsigned char* contact, Sample& s) SHI
     std::fill(s.f, s.f + m.forces, 0.);
     law_forces(w, s);
     pair_forces(w, contact, s);
-    weak_forces(w, contact, s);
-    flank_forces(w, contact, s);
-    bearing_forces(w, contact, s);
+    if (w.model.rare_forces) rare_forces(w, contact, s);
 }
 
 void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
@@ -266,12 +281,8 @@ void stage_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     const double* const load = stage_loads(w, s);
     if (acts) m.kernel.loops.slide(friction_terms(w, load, s), s.f);
     clear_few(acts ? s.f + m.actuated_pairs : s.f, s.f + m.forces);  // the loop went beyond
-    tabled_forces(w, s, false);
     law_forces(w, s);
-    natural_forces(w, s);
-    weak_forces(w, w.contact, s);
-    flank_forces(w, w.contact, s);
-    bearing_forces(w, w.contact, s);
+    further_forces(w, s, false);
 }
 
 void end_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
@@ -280,7 +291,6 @@ void end_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
     const double* const load = w.scratch.moving_count > 0 ? s.load : w.scratch.held.data();
     m.kernel.loops.press(friction_terms(w, load, s), s.f, s.holding, s.sliding);
     clear_few(s.f + m.actuated_pairs, s.f + m.forces);
-    tabled_forces(w, s, true);
     for (int i = 0; i < w.scratch.moving_count;
          ++i) {  // one that is about to engage shows what it would pass
         const int k = w.scratch.moving[static_cast<std::size_t>(i)];
@@ -289,17 +299,12 @@ void end_forces(const Work& w, Sample& s) SHIFTRIG_REALTIME {
             sliding_capacity(m.pair_laws[static_cast<std::size_t>(k)].friction, s.load[k], s.slip[k]);
     }
     law_forces(w, s);
-    natural_forces(w, s);
-    weak_forces(w, w.contact, s);
-    flank_forces(w, w.contact, s);
-    bearing_forces(w, w.contact, s);
+    further_forces(w, s, true);
 }
 
 void contact_forces(const Work& w, const unsigned char* contact, Sample& s) SHIFTRIG_REALTIME {
     for (int k = 0; k < w.model.pairs; ++k) s.f[k] = pair_force(w, k, contact[k], s);
-    weak_forces(w, contact, s);
-    flank_forces(w, contact, s);
-    bearing_forces(w, contact, s);
+    if (w.model.rare_forces) rare_forces(w, contact, s);
 }
 
 void internal_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {

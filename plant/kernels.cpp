@@ -36,6 +36,16 @@ void multiply_portable(const double* panel, int rows, int columns, const double*
 
 constexpr int lanes = 2;
 
+#include "plant/lanes_body.h"
+
+inline bool any(const Marks& marks) noexcept {
+    return (marks[0] | marks[1]) != 0;
+}
+template <typename Join>
+inline double joined(const Lanes& v, const Join& join) noexcept {
+    return join(v[0], v[1]);
+}
+
 #include "plant/device_loops_body.h"
 
 }  // namespace

@@ -58,6 +58,18 @@ constexpr int most_panels = 1;
 
 constexpr int lanes = 4;
 
+#include "plant/lanes_body.h"
+
+inline bool any(const Marks& marks) noexcept {
+    const auto bits = reinterpret_cast<__m256i>(marks);
+    return _mm256_testz_si256(bits, bits) == 0;
+}
+template <typename Join>
+inline double joined(const Lanes& v, const Join& join) noexcept {
+    const auto two = join(__builtin_shufflevector(v, v, 0, 1), __builtin_shufflevector(v, v, 2, 3));
+    return join(two[0], two[1]);
+}
+
 #include "plant/device_loops_body.h"
 #include "plant/kernels_body.h"
 

@@ -43,6 +43,21 @@ constexpr int most_panels = 3;
 
 constexpr int lanes = 8;
 
+#include "plant/lanes_body.h"
+
+inline bool any(const Marks& marks) noexcept {
+    const auto bits = reinterpret_cast<__m512i>(marks);
+    return _mm512_test_epi64_mask(bits, bits) != 0;
+}
+template <typename Join>
+inline double joined(const Lanes& v, const Join& join) noexcept {
+    const auto four =
+        join(__builtin_shufflevector(v, v, 0, 1, 2, 3), __builtin_shufflevector(v, v, 4, 5, 6, 7));
+    const auto two =
+        join(__builtin_shufflevector(four, four, 0, 1), __builtin_shufflevector(four, four, 2, 3));
+    return join(two[0], two[1]);
+}
+
 #include "plant/device_loops_body.h"
 #include "plant/kernels_body.h"
 

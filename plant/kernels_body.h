@@ -51,7 +51,8 @@ SHIFTRIG_TRUSTED_BEGIN  // the compiler cannot see through a function handed on
     tall_product(const double* panel, int rows, int columns, const double* v, const double* y0,
                  double* y) SHIFTRIG_REALTIME {
     constexpr int most = 4 * short_products;
-    constexpr Multiply rest[] = {product<4>, product<8>, product<12>, product<16>, product<20>, product<24>};
+    static constexpr Multiply rest[] = {product<4>,  product<8>,  product<12>,
+                                        product<16>, product<20>, product<24>};
     int r = 0;
     for (; r + most < rows; r += most)
         product<most>(panel + r * columns, 0, columns, v, y0 ? y0 + r : nullptr, y + r);

@@ -93,7 +93,12 @@ void build_columns(ModelData& m) {
     for (const Mesh& mesh : s.meshes) m.mesh_motion.push_back(branchless(mesh.motion()));
     for (const Mesh& mesh : s.meshes) {
         const double slope = mesh.forward_efficiency - 1 / mesh.backward_efficiency;
-        if (mesh.lossy()) m.lossy_meshes.push_back(static_cast<int>(m.lossy.size()));
+        const auto k = static_cast<int>(m.lossy.size());
+        if (mesh.lossy()) {
+            m.lossy_meshes.push_back(k);
+        } else if (m.lossy.size() < m.description.gears.size()) {  // they are the first meshes
+            m.lossless_gears.push_back(k);
+        }
         m.lossy.push_back(mesh.lossy());
         m.loss_kink.push_back(slope < 0 ? (mesh.forward_bearing - mesh.backward_bearing) / slope
                                         : mesh.forward_bearing / 2);
@@ -184,6 +189,8 @@ void build_sizes(ModelData& m) {
         m.force_columns.push_back(shaft.links);
     }
     m.forces = static_cast<int>(m.force_columns.size());
+    m.rare_forces = !m.tabled_pairs.empty() || !m.one_way_pairs.empty() || !m.backlashes.empty() ||
+                    m.first_external > m.pairs;
     for (const auto& links : m.force_columns) m.force_on.push_back(branchless(links));
     m.columns = m.states + m.forces;
     m.law_rows = whole_panels(m.forces + m.meshes);

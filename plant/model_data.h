@@ -125,7 +125,7 @@ struct ModelData {
     std::vector<std::array<Link, 2>> pair_slip, mesh_motion, mesh_loss, shaft_rate, damper_rate, force_on;
     std::vector<std::array<Link, 3>> mesh_slip;
     std::vector<unsigned char> lossy;  // per mesh
-    std::vector<int> lossy_meshes;
+    std::vector<int> lossy_meshes, lossless_gears;
     // Torque at which the loss lines of both directions cross, moving forward [Nm].
     std::vector<double> loss_kink;
     bool depends_on_time = false;      // waveforms: forces are no function of state and inputs alone
@@ -151,6 +151,7 @@ struct ModelData {
     std::array<int, connector_kinds>
         first_pair{};                // by place in the list of connectors.h: pairs of one kind stand side
                                      // by side, in the order of the description; −1: none
+    bool rare_forces = false;        // there are tabled or one-way pairs, bearing friction, or backlashes
     std::vector<int> one_way_pairs;  // those with a weak sense
     std::vector<int> tabled_pairs;   // whose friction factor is a table
     std::vector<BacklashLaw> backlashes;

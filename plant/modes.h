@@ -110,6 +110,8 @@ struct PairCommand {
     double scale = 1;         // leak: share of the chamber pressure that is left
     bool fixed = false;       // stuck open or closed: its load is rest_loads' whatever the actuator does
     bool valve_held = false;  // the valve sticks
+    double rest =
+        0;  // where valve and chamber come to rest [Pa]; not a number: nobody asks (solenoid, or held)
 };
 
 // The cache: a table of bounded size, least recently used goes.

@@ -23,7 +23,8 @@ void fill_outputs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const auto put = [&next](auto... values) { ((*next++ = values), ...); };
 
     if (mode.tree) tree_swings(w, mode, s);
-    next = copy_few(s.z, m.masses, next);
+    m.kernel.loops.copy(s.z, m.masses, next);
+    next += m.masses;
     const Shown at{w, s};
     const auto show_all = [&](const auto& devices) {
         if (!devices.empty()) next = show(at, devices, next);

@@ -101,10 +101,9 @@ bool is_tree_coarse(Work& w, const Mode& mode) {
         double* const difference = w.scratch.vector_c;
         m.kernel.loops.subtract(end.f, late, m.forces, difference);
         std::fill(v.load, v.load + t.paths.groups, 0.);
-        m.tree->kernel.give({t.force_share, t.force, t.force_count, 1, {difference}, {weight}},
-                            t.inverse_mass, v.load);
+        m.tree->kernel.give(t.forces, {1, &difference, &weight}, t.inverse_mass, v.load);
         double* const of_mass = w.scratch.vector_b;
-        m.tree->kernel.spread(t.mass_group, t.mass_ratio, v.load, m.masses, of_mass);
+        m.tree->kernel.spread(t.masses, v.load, m.masses, of_mass);
         return m.kernel.loops.largest(of_mass, m.masses);
     };
     return swings_between(w, mode) || takes_forces_amiss(w, late, weight * t.liveliness, change);

@@ -114,17 +114,10 @@ struct TreeMode {
     double* speed_factor = nullptr;
     double* twist_factor = nullptr;
     // And back: of each mass its group and r, of each shaft its group and 1/factor.
-    int* mass_group = nullptr;
-    int* shaft_group = nullptr;
-    double* mass_ratio = nullptr;
-    double* shaft_ratio = nullptr;
+    Spreading masses, shafts;
     bool exact = false;  // all factors are ±1: there and back it is the same number
-    // Forces that can be other than 0 (not those of locked pairs): what they slip at, and what they take from one or two
-    // groups.
-    int force_count = 0;
-    int* force = nullptr;
-    GroupPairs force_slip,
-        force_share;     // the shares with factors r̂: the group's momentum changes by −factor · f
+    GroupForces
+        forces;  // not those of locked pairs; shares with factors r̂: a momentum changes by −factor · f
     GroupPairs turning;  // per mesh, of what its loss acts on
     // Masses of groups with rigid devices inside, and the link torques that act on them.
     int inner_count = 0;
@@ -200,11 +193,11 @@ void place_groups(const ModelData& model, GroupState& groups, double* memory) no
 
 // Working memory of a step on the tree.
 struct TreeWork {
-    double *momentum = nullptr, *way = nullptr, *load = nullptr, *potential = nullptr, *speed[3] = {},
-           *swing[4] = {};
-    StageMatrix matrix;            // of a part of a step
-    const double* effort[4] = {};  // f of each stage: that of the beginning, then
-    double* stage_effort[3] = {};
+    double *momentum = nullptr, *way = nullptr, *load = nullptr, *potential = nullptr, *swing[4] = {};
+    StageMatrix matrix;  // of a part of a step
+    // Speeds and f of each stage: those of the beginning, then
+    const double *speed[4] = {}, *effort[4] = {};
+    double *stage_speed[3] = {}, *stage_effort[3] = {};
     double* auxiliary_rate[4] = {};  // of each stage
     Swing swing_seen;                // by the last advance; nothing where the mode has none
 };

@@ -45,8 +45,9 @@ using ShaftTorques = void (*)(const TreePaths&, const double* speed, const doubl
 // of the ways that groups turn, Σ of_way_j q_j.
 struct StageSums {
     int count = 0;
-    const double* speed[4] = {};
-    double of_momentum[4] = {}, of_way[4] = {};
+    const double* const* speed = nullptr;                           // so many
+    const double *of_momentum = nullptr, *weight_of_way = nullptr;  // likewise; of_way = h · weight_of_way
+    double h = 0;
     const double* net = nullptr;  // M q̇ at the beginning
     double of_net = 0;
 };
@@ -110,19 +111,28 @@ struct GroupPairs {
 using Slips = void (*)(const GroupPairs&, const double* of_group, const int* place, int count,
                        double* values) SHIFTRIG_REALTIME;
 
-// Adds Σ_j weight_j effort_j[place[i]], times its share, to the sums of one or two groups; with a scale by group, times that.
-struct Efforts {
-    GroupPairs share;
-    const int* place = nullptr;  // rising
+// Forces that can be other than 0: where they stand, what they slip at, and what they take from one or two groups.
+struct GroupForces {
+    GroupPairs slip, share;
+    int* place = nullptr;  // rising
     int count = 0;
-    int terms = 0;
-    const double* effort[4] = {};
-    double weight[4] = {};
 };
-using Give = void (*)(const Efforts&, const double* scale, double* sum) SHIFTRIG_REALTIME;
+// Adds factor · Σ_j weight_j effort_j[place[i]], times its share, to the sums of one or two groups; with a scale by group, times
+// that.
+struct Efforts {
+    int terms = 0;
+    const double* const* effort = nullptr;  // so many
+    const double* weight = nullptr;         // likewise
+    double factor = 1;
+};
+using Give = void (*)(const GroupForces&, const Efforts&, const double* scale, double* sum) SHIFTRIG_REALTIME;
 
-// values[i] = ratio[i] · of_group[group[i]]
-using Spread = void (*)(const int* group, const double* ratio, const double* of_group, int count,
+// values[i] = ratio[i] · of_group[group[i]]; in_line, by block: 1 where its groups lie side by side.
+struct Spreading {
+    int *group = nullptr, *in_line = nullptr;
+    double* ratio = nullptr;
+};
+using Spread = void (*)(const Spreading&, const double* of_group, int count,
                         double* values) SHIFTRIG_REALTIME;
 
 struct TreeKernel {

@@ -93,7 +93,8 @@ void combine_speeds(const TreePaths& t, const StageSums& s, double* __restrict m
                   d = count > 3 ? 3 : 0;  // where there are fewer terms the last ones are unused
     const double* __restrict q0 = s.speed[0], * __restrict q1 = s.speed[b], * __restrict q2 = s.speed[c], * __restrict q3 = s.speed[d];
     const double m0 = s.of_momentum[0], m1 = s.of_momentum[b], m2 = s.of_momentum[c], m3 = s.of_momentum[d];
-    const double w0 = s.of_way[0], w1 = s.of_way[b], w2 = s.of_way[c], w3 = s.of_way[d];
+    const double *const ways = s.weight_of_way, w0 = s.h * ways[0], w1 = s.h * ways[b], w2 = s.h * ways[c],
+                        w3 = s.h * ways[d];
     const double of_net = s.of_net;
     const double* __restrict mass = t.mass, * __restrict net = s.net;
     const int groups = t.groups;
@@ -279,7 +280,9 @@ double middle(const TreePaths& t, const MiddleSums& s, double* speed) SHIFTRIG_R
 
 Swing swing_error(const TreePaths& t, const StageSums& s, double* way) SHIFTRIG_REALTIME {
     const double *q0 = s.speed[0], *q1 = s.speed[1], *q2 = s.speed[2], *q3 = s.speed[3];
-    const Lanes w0 = all(s.of_way[0]), w1 = all(s.of_way[1]), w2 = all(s.of_way[2]), w3 = all(s.of_way[3]);
+    const double* const ways = s.weight_of_way;
+    const Lanes w0 = all(s.h * ways[0]), w1 = all(s.h * ways[1]), w2 = all(s.h * ways[2]),
+                w3 = all(s.h * ways[3]);
     const int groups = t.groups;
     const double* const inside = t.inside;
     const auto largest = [](const Lanes& a, const Lanes& b) { return a > b ? a : b; };
@@ -336,10 +339,23 @@ void correct(const TreePaths& t, const StageMatrix& stage, double* momentum, con
 
 void slips(const GroupPairs& pairs, const double* of_group, const int* place, int count,
            double* values) SHIFTRIG_REALTIME {
+    const auto work_out = [&](int i, Lanes& slip) {
+        slip = read(pairs.of_first + i) * gather(of_group, pairs.first + i) +
+               read(pairs.of_second + i) * gather(of_group, pairs.second + i);
+    };
     int i = 0;
+    // Where loops over devices take eight at a time, they read what one store has written.
+    constexpr int two = 2 * lanes;
+    for (; i + two <= count && place[i + two - 1] - place[i] == two - 1; i += two) {  // places rise
+        Lanes first, second;
+        work_out(i, first);
+        work_out(i + lanes, second);
+        const auto both = __builtin_shufflevector(first, second, 0, 1, 2, 3, 4, 5, 6, 7);
+        __builtin_memcpy(values + place[i], &both, sizeof both);
+    }
     for (; i + lanes <= count; i += lanes) {
-        const Lanes slip = read(pairs.of_first + i) * gather(of_group, pairs.first + i) +
-                           read(pairs.of_second + i) * gather(of_group, pairs.second + i);
+        Lanes slip;
+        work_out(i, slip);
         if (place[i + lanes - 1] - place[i] == lanes - 1) {  // places rise
             write(values + place[i], slip);
         } else {
@@ -352,44 +368,63 @@ void slips(const GroupPairs& pairs, const double* of_group, const int* place, in
     }
 }
 
-template <bool scaled>
-inline void give_efforts(const Efforts& e, const double* scale, double* sum) noexcept {
+template <int terms, bool scaled>
+void give_efforts(const GroupForces& forces, const Efforts& e, const double* scale, double* sum) noexcept {
     const auto give = [=](int g, double impulse) { sum[g] += scaled ? impulse * scale[g] : impulse; };
+    const GroupPairs& share = forces.share;
+    const double* effort[terms];
+    double weight[terms];
+    for (int j = 0; j < terms; ++j) {
+        effort[j] = e.effort[j];
+        weight[j] = e.factor * e.weight[j];
+    }
     int i = 0;
-    for (; i + lanes <= e.count; i += lanes) {
-        const int* const place = e.place + i;
+    for (; i + lanes <= forces.count; i += lanes) {
+        const int* const place = forces.place + i;
         const bool side_by_side = place[lanes - 1] - place[0] == lanes - 1;
-        Lanes effort = {};
-        for (int j = 0; j < e.terms; ++j) {
-            const Lanes term = side_by_side ? read(e.effort[j] + place[0]) : gather(e.effort[j], place);
-            effort = SHIFTRIG_BLOCK_FMA(all(e.weight[j]), term, effort);
+        Lanes sum_of_terms = {};
+        for (int j = 0; j < terms; ++j) {
+            const Lanes term = side_by_side ? read(effort[j] + place[0]) : gather(effort[j], place);
+            sum_of_terms = SHIFTRIG_BLOCK_FMA(all(weight[j]), term, sum_of_terms);
         }
-        const Lanes first = read(e.share.of_first + i) * effort,
-                    second = read(e.share.of_second + i) * effort;
+        const Lanes first = read(share.of_first + i) * sum_of_terms,
+                    second = read(share.of_second + i) * sum_of_terms;
         for (int j = 0; j < lanes; ++j) {
-            give(e.share.first[i + j], first[j]);
-            give(e.share.second[i + j], second[j]);
+            give(share.first[i + j], first[j]);
+            give(share.second[i + j], second[j]);
         }
     }
-    for (; i < e.count; ++i) {
-        double effort = 0;
-        for (int j = 0; j < e.terms; ++j) effort = SHIFTRIG_FMA(e.weight[j], e.effort[j][e.place[i]], effort);
-        give(e.share.first[i], e.share.of_first[i] * effort);
-        give(e.share.second[i], e.share.of_second[i] * effort);
+    for (; i < forces.count; ++i) {
+        double sum_of_terms = 0;
+        for (int j = 0; j < terms; ++j)
+            sum_of_terms = SHIFTRIG_FMA(weight[j], effort[j][forces.place[i]], sum_of_terms);
+        give(share.first[i], share.of_first[i] * sum_of_terms);
+        give(share.second[i], share.of_second[i] * sum_of_terms);
     }
 }
 
-void give(const Efforts& e, const double* scale, double* sum) SHIFTRIG_REALTIME {
-    scale ? give_efforts<true>(e, scale, sum) : give_efforts<false>(e, scale, sum);
+template <int terms>
+inline void give_terms(const GroupForces& forces, const Efforts& e, const double* scale,
+                       double* sum) noexcept {
+    scale ? give_efforts<terms, true>(forces, e, scale, sum)
+          : give_efforts<terms, false>(forces, e, nullptr, sum);
 }
 
-void spread(const int* group, const double* ratio, const double* of_group, int count,
-            double* values) SHIFTRIG_REALTIME {
+void give(const GroupForces& forces, const Efforts& e, const double* scale, double* sum) SHIFTRIG_REALTIME {
+    if (e.terms == 1) give_terms<1>(forces, e, scale, sum);
+    if (e.terms == 2) give_terms<2>(forces, e, scale, sum);
+    if (e.terms == 3) give_terms<3>(forces, e, scale, sum);
+    if (e.terms == 4) give_terms<4>(forces, e, scale, sum);
+}
+
+void spread(const Spreading& s, const double* of_group, int count, double* values) SHIFTRIG_REALTIME {
+    const int* const group = s.group;
     int i = 0;
     for (; i + lanes <= count; i += lanes) {
-        write(values + i, read(ratio + i) * gather(of_group, group + i));
+        const Lanes from = s.in_line[i / lanes] ? read(of_group + group[i]) : gather(of_group, group + i);
+        write(values + i, read(s.ratio + i) * from);
     }
-    for (; i < count; ++i) values[i] = ratio[i] * of_group[group[i]];
+    for (; i < count; ++i) values[i] = s.ratio[i] * of_group[group[i]];
 }
 
 constexpr TreeKernel kernel{shaft_torques, combine, solve, finish, middle,

@@ -49,7 +49,7 @@ std::size_t place_work(const ModelData& m, TreeWork& work, double* memory) {
         return at ? at + margin : nullptr;
     };
     for (double** vector : {&work.momentum, &work.way, &work.load, &work.potential}) *vector = take();
-    for (double*& vector : work.speed) vector = take();
+    for (double*& vector : work.stage_speed) vector = take();
     for (double*& vector : work.swing) vector = take();
     place_matrix(work.matrix, shelf, mode_stride(m));
     for (double*& vector : work.stage_effort) vector = shelf.take(whole_panels(m.forces));
@@ -65,24 +65,25 @@ TreeSizes place_tree(const ModelData& m, TreeMode& t, const TreeMemory& memory) 
     const int n = mode_stride(m), grounds = static_cast<int>(m.tree->grounds.size()) + m.meshes,
               pairs = whole_panels(std::max(m.forces, m.meshes));  // by force or mesh
     for (double** array :
-         {&t.ratio,      &t.force_ratio,     &t.mass,          &t.inverse_mass,    &t.drag,
-          &t.stiffness,  &t.damping,         &t.loss,          &t.drag_loss,       &t.edge_own,
-          &t.edge_up,    &t.network_inverse, &t.network_lower, &t.speed_factor,    &t.twist_factor,
-          &t.mass_ratio, &t.shaft_ratio,     &t.inside,        &t.inner_stiffness, &t.inner_damping})
+         {&t.ratio,        &t.force_ratio,     &t.mass,          &t.inverse_mass,    &t.drag,
+          &t.stiffness,    &t.damping,         &t.loss,          &t.drag_loss,       &t.edge_own,
+          &t.edge_up,      &t.network_inverse, &t.network_lower, &t.speed_factor,    &t.twist_factor,
+          &t.masses.ratio, &t.shafts.ratio,    &t.inside,        &t.inner_stiffness, &t.inner_damping})
         *array = doubles.take(n);
     place_matrix(t.matrix, doubles, n);
     t.end_factor = doubles.take(2 * n);  // two ends of every link
     for (int** array :
          {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.head, &t.run_begin,
-          &t.run_parent, &t.speed_slot, &t.twist_slot, &t.mass_group, &t.shaft_group, &t.up, &t.spent})
+          &t.run_parent, &t.speed_slot, &t.twist_slot, &t.masses.group, &t.shafts.group, &t.up, &t.spent})
         *array = integers.take(n);
+    for (int** array : {&t.masses.in_line, &t.shafts.in_line}) *array = integers.take(n / tree_block);
     t.end_group = integers.take(2 * n);
     t.end_position = integers.take(2 * n);
     t.ground_position = integers.take(grounds);
     t.ground_unknown = integers.take(grounds);
     t.ground_factor = doubles.take(whole_panels(grounds));
-    t.force = integers.take(pairs);
-    for (GroupPairs* list : {&t.force_slip, &t.force_share, &t.turning}) {
+    t.forces.place = integers.take(pairs);
+    for (GroupPairs* list : {&t.forces.slip, &t.forces.share, &t.turning}) {
         list->first = integers.take(pairs);
         list->second = integers.take(pairs);
         list->of_first = doubles.take(pairs);

@@ -115,6 +115,14 @@ void find_paths(TreeMode& t) {
     paths.damping = t.damping;
 }
 
+void find_lines(Spreading& s, int count) {
+    for (int i = 0; i + tree_block <= count; i += tree_block) {
+        bool in_line = true;
+        for (int j = 1; j < tree_block; ++j) in_line = in_line && s.group[i + j] == s.group[i] + j;
+        s.in_line[i / tree_block] = in_line;
+    }
+}
+
 // Which masses carry rigid devices, and where q and ψ stand in z.
 void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
     const TreeTopology& topology = *m.tree;
@@ -128,8 +136,8 @@ void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
     t.inner_count = t.end_count = t.spent_count = t.inner_force_count = t.inner_edge_count = 0;
     for (int p = 0; p < m.masses; ++p) {
         const auto i = static_cast<std::size_t>(p);
-        t.mass_group[topology.mass[i]] = t.group[p];
-        t.mass_ratio[topology.mass[i]] = t.ratio[p];
+        t.masses.group[topology.mass[i]] = t.group[p];
+        t.masses.ratio[topology.mass[i]] = t.ratio[p];
         if (rigid[p]) {
             t.inner[t.inner_count++] = {
                 p, t.group[p], t.ratio[p] * m.structure.inertia[static_cast<std::size_t>(topology.mass[i])],
@@ -159,11 +167,13 @@ void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
         t.twist_slot[g] = edge.shaft < 0 ? 0 : m.masses + edge.shaft;
         t.twist_factor[g] = edge.shaft < 0 ? 0 : edge.sign / t.ratio[p];
         if (edge.shaft >= 0) {
-            t.shaft_group[edge.shaft] = g;
-            t.shaft_ratio[edge.shaft] = edge.sign * t.ratio[p];
+            t.shafts.group[edge.shaft] = g;
+            t.shafts.ratio[edge.shaft] = edge.sign * t.ratio[p];
         }
         t.exact = t.exact && std::fabs(t.ratio[p]) == 1;
     }
+    find_lines(t.masses, m.masses);
+    find_lines(t.shafts, m.twists);
     const auto end = [&](int g, int position, double factor) {
         if (!rigid[position]) return;
         t.end_group[t.end_count] = g;
@@ -191,19 +201,19 @@ void set_groups(const ModelData& m, const TreeMode& t, const std::array<Link, 2>
 }
 
 void find_forces(const ModelData& m, const Mode& mode, TreeMode& t) {
-    t.force_count = 0;
+    t.forces.count = 0;
     for (int k = 0; k < m.forces; ++k) {
         if (k < m.pairs && mode.key[k]) continue;
         const auto i = static_cast<std::size_t>(k);
-        set_groups(m, t, m.force_on[i], t.ratio, t.force_count, t.force_slip);
-        set_groups(m, t, m.force_columns[i], t.force_ratio, t.force_count, t.force_share);
-        t.force[t.force_count++] = k;
+        set_groups(m, t, m.force_on[i], t.ratio, t.forces.count, t.forces.slip);
+        set_groups(m, t, m.force_columns[i], t.force_ratio, t.forces.count, t.forces.share);
+        t.forces.place[t.forces.count++] = k;
     }
     double* const share = t.matrix.inverse;  // Σ of the forces at each group; not yet in use
     std::fill(share, share + t.paths.groups, 0.);
-    for (int i = 0; i < t.force_count; ++i) {
-        share[t.force_share.first[i]] += std::fabs(t.force_share.of_first[i]);
-        share[t.force_share.second[i]] += std::fabs(t.force_share.of_second[i]);
+    for (int i = 0; i < t.forces.count; ++i) {
+        share[t.forces.share.first[i]] += std::fabs(t.forces.share.of_first[i]);
+        share[t.forces.share.second[i]] += std::fabs(t.forces.share.of_second[i]);
     }
     double* const widest = t.matrix.lower;  // r of the masses of each group; likewise
     std::fill(widest, widest + t.paths.groups, 0.);

@@ -59,7 +59,8 @@ void complete_groups(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTI
     GroupState& groups = s.groups;
     const TreeKernel& kernel = w.model.tree->kernel;
     kernel.shaft_torques(t.paths, groups.speed, groups.twist, groups.rate, groups.passed, groups.net);
-    kernel.give({t.force_share, t.force, t.force_count, 1, {s.f}, {-1}}, nullptr, groups.net);
+    constexpr double once[] = {-1};
+    kernel.give(t.forces, {1, &s.f, once}, nullptr, groups.net);
     groups.mode = &mode;
     groups.modes_built = w.operators.misses;
 }
@@ -74,8 +75,8 @@ const GroupState& groups_of(const Work& w, const Mode& mode, Sample& s) SHIFTRIG
 
 void group_slips(const ModelData& m, const Mode& mode, const double* speed, Sample& s) SHIFTRIG_REALTIME {
     const TreeMode& t = *mode.tree;
-    if (t.force_count < m.forces) clear_few(s.slip, s.slip + m.forces);  // what is locked does not slip
-    m.tree->kernel.slips(t.force_slip, speed, t.force, t.force_count, s.slip);
+    if (t.forces.count < m.forces) clear_few(s.slip, s.slip + m.forces);  // what is locked does not slip
+    m.tree->kernel.slips(t.forces.slip, speed, t.forces.place, t.forces.count, s.slip);
     for (int k = 0; k < m.meshes; ++k) {
         s.turning[k] = mode.loss_share[k] == 0 ? 0
                                                : t.turning.of_first[k] * speed[t.turning.first[k]] +
@@ -139,8 +140,7 @@ void tree_slips(const ModelData& m, const Mode& mode, Sample& s) SHIFTRIG_REALTI
 
 void tree_swings(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const TreeMode& t = *mode.tree;
-    w.model.tree->kernel.spread(t.shaft_group, t.shaft_ratio, groups_of(w, mode, s).rate, w.model.twists,
-                                s.swing);
+    w.model.tree->kernel.spread(t.shafts, groups_of(w, mode, s).rate, w.model.twists, s.swing);
 }
 
 void tree_sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {

@@ -42,8 +42,8 @@ double* show(const detail::Shown& at, const std::vector<Gear>& devices, double* 
     const double *const torque = at.sample.torque + m.pairs, *const speeds = at.sample.z;
     const double* const direction = at.work.operators.table.direction;
     next = detail::copy_few(torque, gears, next);
-    const unsigned char* const lossy = m.lossy.data();
-    for (int k = 0; k < gears; ++k) next[k] = lossy[k] ? direction[k] : at.flow(k);
+    detail::copy_few(direction, gears, next);
+    for (const int k : m.lossless_gears) next[k] = at.flow(k);
     next += gears;
     const Mesh* const meshes = m.structure.meshes.data();
     for (int k = 0; k < gears; ++k) next[k] = torque[k] * speeds[meshes[k].first];

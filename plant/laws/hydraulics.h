@@ -257,18 +257,12 @@ inline double limited_command(const ActuationHydraulic& p, double command) noexc
     return command < 0 ? 0 : command > p.maximum_pressure ? p.maximum_pressure : command;
 }
 
-// Nothing will change in a step with this command: the delay line holds nothing else, and valve and piston have
-// arrived. Advancing the state would leave all but `head` as it is. Once found, `steady` says so: it is then enough that
-// the command is still where the chamber is.
-inline bool is_quiet(const ActuationHydraulic& p, double& steady, const HydraulicState& state,
-                     std::size_t slots, double command) noexcept {
-    const double target = limited_command(p, command), all = static_cast<double>(slots);
-    if (state.chamber != target) return false;
-    if (steady > all) return true;
-    if (state.slewed != target || state.valve != target || state.valve_rate != 0 || steady < all)
-        return false;
-    steady = all + 1;
-    return true;
+// Nothing will change in a step with the limited command `target`: the delay line holds nothing else, and valve and piston
+// have arrived. Advancing the state would leave all but `head` as it is. Once found, `steady` says so, one more than the
+// slots: it is then enough that the command is still where the chamber is.
+inline bool is_quiet(const HydraulicState& state, std::size_t slots, double target) noexcept {
+    return state.chamber == target && state.slewed == target && state.valve == target &&
+           state.valve_rate == 0 && state.steady >= static_cast<double>(slots);
 }
 
 // One step with the pressure command `command` held over it. `valve_held`: the valve sticks and keeps its

@@ -82,6 +82,44 @@ TEST_P(DeviceLoopsOf, SuspectEveryMarginThatFallsAndRisesAgain) {
 }
 
 // Bit for bit, whatever registers do it: a sample may come from a step or be computed anew.
+TEST_P(DeviceLoopsOf, SeeThePairThatShouldEngageOrLetGo) {
+    for (int count = 0; count <= most; ++count) {
+        std::vector<double> sliding = positive(count), holding = positive(count), code = numbers(count);
+        for (int k = 0; k < count; ++k) {
+            code[at(k)] = k % 3;  // 2: free
+            if (code[at(k)] == 2) sliding[at(k)] = holding[at(k)] = 0;
+            if (k % 3 == 0) (k % 2 ? sliding : holding)[at(k)] = 0;  // one of both is enough
+        }
+        EXPECT_TRUE(loops.pressed_engage(sliding.data(), holding.data(), code.data(), count)) << count;
+        for (int k = 0; k < count; ++k) {
+            const double kept = code[at(k)];
+            code[at(k)] = kept == 2 ? 1 : 2;
+            EXPECT_FALSE(loops.pressed_engage(sliding.data(), holding.data(), code.data(), count)) << k;
+            code[at(k)] = kept;
+        }
+    }
+}
+
+TEST_P(DeviceLoopsOf, SeeTheOneMeshWhosePowerHasTurned) {
+    for (int count = 0; count <= most; ++count) {
+        std::vector<double> torque = numbers(count), direction = numbers(count), checked = numbers(count),
+                            told = numbers(count);
+        for (int k = 0; k < count; ++k) {
+            torque[at(k)] = k % 2 ? 5 : -5;
+            checked[at(k)] = k % 3 == 2 ? 0 : k % 2 ? 1 : -1;
+            direction[at(k)] = told[at(k)] = k % 4 < 2 ? 1 : -1;
+        }
+        const MeshFlow flow{torque.data(), direction.data(), checked.data(), count};
+        EXPECT_FALSE(loops.some_turned(flow, told.data(), 5)) << count;
+        for (int k = 0; k < count; ++k) {
+            direction[at(k)] = -direction[at(k)];
+            EXPECT_EQ(loops.some_turned(flow, told.data(), 5), k % 3 != 2) << k << " of " << count;
+            EXPECT_FALSE(loops.some_turned(flow, told.data(), 5.1)) << "too little torque";
+            direction[at(k)] = -direction[at(k)];
+        }
+    }
+}
+
 TEST_P(DeviceLoopsOf, PressSlideAndDragAsTheLawsDo) {
     for (int count = 1; count <= most; ++count) {
         const std::vector<double> load = positive(count), rest = positive(count), base = positive(count);

@@ -73,21 +73,31 @@ class TreeKernelsOf : public testing::TestWithParam<KernelKind> {
     void on_forests(const Look& look) {
         for (int n = 0; n < 120; ++n) {
             const int size = 2 + static_cast<int>(random() % 70u);
-            const double branches[] = {0, 0.03, 0.5}, roots[] = {0, 0.1};
+            const double branches[] = {0, 0.03, 0.5}, roots[] = {0, 0.2};
             const Model model =
                 Model::build(forest(random, size, branches[n % 3], roots[n / 3 % 2]), {1e-3, GetParam()});
             const ModelData& m = model.data();
             Operators operators(model);
             Scratch scratch(model);
-            const std::vector<unsigned char> open(static_cast<std::size_t>(m.contact_bytes), free_running);
-            const Mode& mode = find_mode(m, operators.data(), open.data(), scratch.data());
+            std::vector<unsigned char> contact(static_cast<std::size_t>(m.contact_bytes), free_running);
+            for (int k = 0; n % 4 == 3 && k < m.pairs; ++k)
+                contact[static_cast<std::size_t>(k)] = random() % 4 == 0 ? locked : free_running;
+            const Mode& mode = find_mode(m, operators.data(), contact.data(), scratch.data());
             const TreePaths& t = mode.tree->paths;
             branching += t.hanging > 0;
             scanned += t.long_runs;
+            const GroupForces& forces = mode.tree->forces;
+            with_many_forces += forces.count > 2 * tree_block;
+            with_gaps += forces.count > 0 && forces.count < m.forces;
+            const int* const in_line = mode.tree->masses.in_line;
+            with_lines += std::count(in_line, in_line + size / tree_block, 1) > 1;
             look(m, *mode.tree, t);
         }
         EXPECT_GT(branching, 20);
         EXPECT_GT(scanned, 20);
+        EXPECT_GT(with_many_forces, 5);
+        EXPECT_GT(with_gaps, 5);
+        EXPECT_GT(with_lines, 20);
     }
     // Of each group and its parent; roots have none.
     static double difference(const TreeMode& tree, const Vector& v, int g) {
@@ -105,7 +115,7 @@ class TreeKernelsOf : public testing::TestWithParam<KernelKind> {
     }
 
     std::mt19937_64 random{11};
-    int branching = 0, scanned = 0;
+    int branching = 0, scanned = 0, with_many_forces = 0, with_gaps = 0, with_lines = 0;
 };
 
 INSTANTIATE_TEST_SUITE_P(Kernels, TreeKernelsOf, testing::ValuesIn(offered_kernels()), kernel_name);
@@ -165,15 +175,9 @@ TEST_P(TreeKernelsOf, CombineAndFinishStages) {
         const Vector q[4] = {{n, random, 100}, {n, random, 100}, {n, random, 100}, {n, random, 100}};
         const Vector net(n, random, 50);
         for (int count = 1; count <= 4; ++count) {
-            StageSums sums;
-            sums.count = count;
-            sums.net = net.data();
-            sums.of_net = 1e-3;
-            for (int j = 0; j < count; ++j) {
-                sums.speed[j] = q[j].data();
-                sums.of_momentum[j] = 0.3 * j - 0.5;
-                sums.of_way[j] = 1e-3 * (j + 1);
-            }
+            const double* const speeds[] = {q[0].data(), q[1].data(), q[2].data(), q[3].data()};
+            const double of_momentum[] = {-0.5, -0.2, 0.1, 0.4}, weights[] = {1, 2, 3, 4};
+            const StageSums sums{count, speeds, of_momentum, weights, 1e-3, net.data(), 1e-3};
             Vector momentum(n), way(n);
             m.tree->kernel.combine(t, sums, momentum.data(), way.data());
             EXPECT_EQ(way[-1], 0);
@@ -181,8 +185,8 @@ TEST_P(TreeKernelsOf, CombineAndFinishStages) {
             for (int g = 0; g < n; ++g) {
                 double p = 1e-3 * net[g], turned = 0;
                 for (int j = 0; j < count; ++j) {
-                    p += tree.mass[g] * sums.of_momentum[j] * (j == 0 ? q[0][g] : q[j][g] - q[0][g]);
-                    turned += sums.of_way[j] * q[j][g];
+                    p += tree.mass[g] * of_momentum[j] * (j == 0 ? q[0][g] : q[j][g] - q[0][g]);
+                    turned += 1e-3 * weights[j] * q[j][g];
                 }
                 EXPECT_NEAR(momentum[g], p, 1e-12 * 400);
                 EXPECT_NEAR(way[g], turned, 1e-15 * 400);
@@ -234,17 +238,16 @@ TEST_P(TreeKernelsOf, FindTheLargestSwing) {
     on_forests([&](const ModelData& m, const TreeMode& tree, const TreePaths& t) {
         const int n = t.groups;
         const Vector q[4] = {{n, random, 100}, {n, random, 100}, {n, random, 100}, {n, random, 100}};
-        StageSums sums;
-        sums.count = 4;
+        const double* const speeds[] = {q[0].data(), q[1].data(), q[2].data(), q[3].data()};
+        const double weights[] = {2, 1, 0, -1};
+        StageSums sums{4, speeds};
+        sums.weight_of_way = weights;
+        sums.h = 1e-3;
         Vector way(n), turned(n);
-        for (int j = 0; j < 4; ++j) {
-            sums.speed[j] = q[j].data();
-            sums.of_way[j] = 1e-3 * (2 - j);
-        }
         const Swing swing = m.tree->kernel.swing_error(t, sums, way.data());
         double error = 0, fastest = 0;
         for (int g = 0; g < n; ++g) {
-            for (int j = 0; j < 4; ++j) turned[g] = (j == 0 ? 0 : turned[g]) + sums.of_way[j] * q[j][g];
+            for (int j = 0; j < 4; ++j) turned[g] = (j == 0 ? 0 : turned[g]) + 1e-3 * weights[j] * q[j][g];
             fastest = std::max(fastest, std::fabs(q[3][g]));
         }
         for (int g = 0; g < n; ++g) error = std::max(error, std::fabs(difference(tree, turned, g)));
@@ -259,18 +262,20 @@ TEST_P(TreeKernelsOf, TakeFromGroupsAndGiveToThem) {
         const TreeKernel& kernel = m.tree->kernel;
         const Vector speed(n, random, 100), f[2] = {{m.forces, random, 50}, {m.forces, random, 50}};
         Vector slip(m.forces), sum(n, random), scaled(n, random), spread(m.masses);
-        kernel.slips(tree.force_slip, speed.data(), tree.force, tree.force_count, slip.data());
-        kernel.spread(tree.mass_group, tree.mass_ratio, speed.data(), m.masses, spread.data());
+        const GroupForces& forces = tree.forces;
+        kernel.slips(forces.slip, speed.data(), forces.place, forces.count, slip.data());
+        kernel.spread(tree.masses, speed.data(), m.masses, spread.data());
         Eigen::VectorXd wanted = sum.eigen(), wanted_scaled = scaled.eigen();
-        const Efforts efforts{tree.force_share,           tree.force, tree.force_count, 2,
-                              {f[0].data(), f[1].data()}, {0.5, -2}};
-        kernel.give(efforts, nullptr, sum.data());
-        kernel.give(efforts, tree.inverse_mass, scaled.data());
+        const double* const both[] = {f[0].data(), f[1].data()};
+        const double weights[] = {0.25, -1};
+        const Efforts efforts{2, both, weights, 2};
+        kernel.give(forces, efforts, nullptr, sum.data());
+        kernel.give(forces, efforts, tree.inverse_mass, scaled.data());
         for (int j = 0; j < m.masses; ++j)
-            EXPECT_EQ(spread[j], tree.mass_ratio[j] * speed[tree.mass_group[j]]);
-        for (int i = 0; i < tree.force_count; ++i) {
-            const int k = tree.force[i];
-            const GroupPairs &seen = tree.force_slip, &share = tree.force_share;
+            EXPECT_EQ(spread[j], tree.masses.ratio[j] * speed[tree.masses.group[j]]);
+        for (int i = 0; i < forces.count; ++i) {
+            const int k = forces.place[i];
+            const GroupPairs &seen = forces.slip, &share = forces.share;
             EXPECT_NEAR(slip[k],
                         seen.of_first[i] * speed[seen.first[i]] + seen.of_second[i] * speed[seen.second[i]],
                         1e-12);
