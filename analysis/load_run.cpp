@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "io/recording/event_json.h"
 #include "io/recording/reader.h"
 #include "io/recording/rebuild.h"
 
@@ -70,8 +71,11 @@ Run load_run(const std::string& path, const std::vector<std::string>& signals) {
             run.columns[c].value.push_back(values_of(tick, sources[c].table)[sources[c].index]);
         for (const auto& event : tick.events)
             run.changes.push_back(
-                {event, event.device < 0 ? "" : manifest.devices[static_cast<std::size_t>(event.device)],
-                 plant::explain(model, event)});
+                {event,
+                 event.device < 0 ? "" : manifest.devices[static_cast<std::size_t>(event.device)],
+                 plant::explain(model, event),
+                 {},
+                 io::loop_members(event, manifest.devices)});
         for (std::size_t i = 0; i < tick.rig.size(); ++i)
             if (const auto text = words(manifest.rig[i].name, rig_before[i], tick.rig[i])) {
                 char stamp[32];

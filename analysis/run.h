@@ -19,9 +19,10 @@ struct Column {
 
 struct Change {
     plant::Event event;
-    std::string device;  // "F2"; empty: the rig's own
-    std::string text;    // plant::explain(), or the rig's words
-    std::string kind{};  // "lock", "safe_command": as scenarios name it
+    std::string device;                  // "F2"; empty: the rig's own
+    std::string text;                    // plant::explain(), or the rig's words
+    std::string kind{};                  // "lock", "safe_command": as scenarios name it
+    std::vector<std::string> members{};  // of a tie-up: who shares the load
 };
 
 struct Run {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -6,14 +7,63 @@
 #include "plant/model_data.h"
 
 namespace shiftrig::plant {
+namespace {
+
+// A torque of an event, whether it is one of a truck or of a watch.
+std::string amount(const Event& event, double value) {
+    const double size = std::max(std::fabs(event.torque), std::fabs(event.capacity));
+    if (size >= 1 || std::fabs(value) <= 1e-9 * size) return format("%.1f", value);
+    return format("%.3g", value);
+}
+
+// Does the device act on a body that moves straight on? Then it has forces and m/s.
+bool is_straight(const detail::ModelData& m, int device) {
+    if (device < 0 || device >= m.pairs) return false;
+    for (const Link& link : m.structure.pairs[static_cast<std::size_t>(device)].links) {
+        if (link.mass < 0) continue;
+        return std::find(m.translating.begin(), m.translating.end(), link.mass) != m.translating.end();
+    }
+    return false;
+}
+
+std::string loop_of(const detail::ModelData& m, const Event& event) {
+    std::string names;
+    for (int i = 0; i < most_members; ++i) {
+        if (event.members >> i & 1)
+            names += (names.empty() ? "" : ", ") + m.device_names[static_cast<std::size_t>(event.device + i)];
+    }
+    return names + (event.members >> most_members & 1 ? " and others" : "");
+}
+
+// What rest takes of the losses, and what they allow.
+std::string rest(const Event& event) {
+    return amount(event, std::fabs(event.torque)) + " Nm of its losses, which allow " +
+           amount(event, event.capacity);
+}
+
+}  // namespace
+
+bool has_margin(EventKind kind) noexcept {
+    switch (kind) {
+        case EventKind::lock:
+        case EventKind::break_away:
+        case EventKind::tie_up:
+        case EventKind::mesh_sticks:
+        case EventKind::mesh_releases:
+            return true;
+        default:
+            return false;
+    }
+}
 
 std::string explain(const Model& model, const Event& event) {
     const detail::ModelData& m = model.data();
     const auto device = static_cast<std::size_t>(event.device < 0 ? 0 : event.device);
     const std::string name = event.device < 0 ? "model" : m.device_names[device];
-    const char* unit = "Nm";
-    const auto say = [](const char* pattern, auto... values) { return format(pattern, values...); };
-    std::string line = say("t=%.7f ", event.time) + name + " ";
+    const bool straight = is_straight(m, event.device);
+    const std::string torque = straight ? "force " : "torque ", unit = straight ? " N" : " Nm",
+                      speed = straight ? " m/s" : " rad/s";
+    const std::string line = format("t=%.7f ", event.time) + name + " ";
     std::string words;
     for_each_connector(m.description, [&](const auto& connector) {
         if (event.device >= 0 && connector.name == name) words = in_words(connector, event);
@@ -21,37 +71,39 @@ std::string explain(const Model& model, const Event& event) {
     if (!words.empty()) return line + words;
     switch (event.kind) {
         case EventKind::lock:
-            return line + say("locks: slip %.3g, torque %.1f of %.1f %s static", event.slip, event.torque,
-                              event.capacity, unit);
-        case EventKind::break_away:
-            return line +
-                   say("breaks away: torque %.1f beyond %.1f %s static", event.torque, event.capacity, unit);
-        case EventKind::engage:
-            return line + say("engages: slip %.3f rad/s, capacity %.1f %s", event.slip, event.capacity, unit);
-        case EventKind::release:
-            return line + say("is free: slip %.3f rad/s", event.slip);
-        case EventKind::mesh_sticks:
-            return line + say("sticks: rest needs %.1f %s of its loss, which allows %.1f",
-                              std::fabs(event.torque), unit, event.capacity);
-        case EventKind::mesh_releases:
-            return line + say("moves again: rest would need %.1f %s of its loss, which allows %.1f",
-                              std::fabs(event.torque), unit, event.capacity);
-        case EventKind::drive_side:
-            return line + (event.slip < 0 ? "is driven" : "drives") +
-                   say(": torque on its first link %.1f %s", event.torque, unit);
-        case EventKind::tie_up: {
-            std::string loop;
-            const auto members = static_cast<std::uint64_t>(event.slip);
-            for (std::size_t k = 0; k < m.device_names.size() && k < 64; ++k) {
-                if (members >> k & 1) loop += (loop.empty() ? "" : ", ") + m.device_names[k];
-            }
-            return line +
-                   say("carries %.1f of %.1f %s in the closed loop of ", event.torque, event.capacity, unit) +
-                   loop + ": how they share the torque is not unique";
+            return line + format("locks: slip %.3g, ", event.slip) + torque + amount(event, event.torque) +
+                   " of " + amount(event, event.capacity) + unit + " static";
+        case EventKind::break_away: {
+            // Located, it stands at its limit but for what locating leaves.
+            const bool at_limit = std::fabs(margin(event)) <= 1e-4 * event.capacity;
+            return line + "breaks away: " + torque + amount(event, event.torque) +
+                   (at_limit ? " at its limit of " : " beyond ") + amount(event, event.capacity) + unit +
+                   " static";
         }
+        case EventKind::engage:
+            return line + format("engages: slip %.3f", event.slip) + speed + ", capacity " +
+                   amount(event, event.capacity) + unit;
+        case EventKind::release:
+            return line + format("is free: slip %.3f", event.slip) + speed;
+        case EventKind::mesh_sticks:
+            return line + "sticks: rest needs " + rest(event);
+        case EventKind::mesh_releases:
+            return line + (event.value == 0 ? "moves again" : "passes through rest") + ": rest would need " +
+                   rest(event);
+        case EventKind::drive_side:
+            return line + (event.value < 0 ? "is driven" : "drives") + ": torque on its first link " +
+                   amount(event, event.torque) + " Nm";
+        case EventKind::tie_up:
+            return line + "carries " + amount(event, event.torque) + " of " + amount(event, event.capacity) +
+                   unit + " in the closed loop of " + loop_of(m, event) +
+                   ": how they share the torque is not unique";
         case EventKind::fall_back:
             return line +
-                   "has more state changes in this step than are located: the rest act from the next step on";
+                   "and what follows it change from here on, not where they should: more state changes in "
+                   "this step than "
+                   "are located";
+        case EventKind::untold:
+            return line + format("has %.0f more changes of state in this step than it can tell", event.value);
         default:
             break;  // told by the device itself
     }

@@ -9,6 +9,7 @@
 #include "plant/laws/sensor.h"
 #include "plant/ledger.h"
 #include "plant/stuck_meshes.h"
+#include "plant/telling.h"
 #include "plant/transitions.h"
 
 namespace shiftrig::plant::detail {
@@ -103,11 +104,14 @@ void advance_temperatures(Work& w) {
     for (int i = 0; i < count; ++i) {
         const auto k = static_cast<std::size_t>(i);
         const auto passes = [&](double limit) { return before[i] < limit && surface[i] >= limit; };
-        const double end = w.start + w.h;
-        if (passes(heat.warn[k]))
-            log_event(w, EventKind::facing_warning, m.heated_pairs[k], end, 0, 0, surface[i]);
-        if (passes(heat.fail[k]))
-            log_event(w, EventKind::facing_failure, m.heated_pairs[k], end, 0, 0, surface[i]);
+        const auto tell = [&](EventKind kind) {
+            log_event(w, {.time = w.start + w.h,
+                          .kind = kind,
+                          .device = device_index(m.heated_pairs[k]),
+                          .value = surface[i]});
+        };
+        if (passes(heat.warn[k])) tell(EventKind::facing_warning);
+        if (passes(heat.fail[k])) tell(EventKind::facing_failure);
     }
 }
 
@@ -126,7 +130,11 @@ void advance_engine_modes(Work& w) {
         if (next != mode && next != EngineMode::cranking) {
             const EventKind kind =
                 next == EngineMode::stalled ? EventKind::engine_stalls : EventKind::engine_starts;
-            log_event(w, kind, device, w.start + w.h, state[0], 0, speed);
+            log_event(w, {.time = w.start + w.h,
+                          .kind = kind,
+                          .device = device_index(device),
+                          .torque = state[0],
+                          .value = speed});
         }
         if (next != mode) w.scratch.carries = false;  // another law from now on
         if (next != EngineMode::running) state[0] = state[1] = 0;
@@ -199,42 +207,6 @@ double constraint_violation(const Mode& mode, const double* speeds) {
     for (int r = 0; r < mode.row_count; ++r)
         worst = std::max(worst, std::fabs(slip_fast(mode.row_links[r], speeds)));
     return worst;
-}
-
-// Emits the events that belong to the step as a whole.
-void report_changes(Work& w, const Mode& mode) {
-    const ModelData& m = w.model;
-    const double end = w.start + w.h;
-    const Sample& s = w.scratch.begin();
-    // Power that turns round in a mesh, once the mesh is loaded: idle pinions turn to and fro around nothing.
-    double* const told = w.next + m.layout.drive_sides;
-    const double* const direction = w.operators.table.direction;
-    const double* const torque = s.torque + m.pairs;
-    const MeshFlow flow{torque, direction, w.operators.table.drive, m.meshes};
-    const bool turned = m.kernel.loops.some_turned(flow, told, m.noteworthy_torque);
-    for (int i = 0, count = turned ? static_cast<int>(m.lossy_meshes.size()) : 0; i < count; ++i) {
-        const int k = m.lossy_meshes[static_cast<std::size_t>(i)];
-        const double x = direction[k];
-        if (told[k] == x || x == 0 || std::fabs(torque[k]) < m.noteworthy_torque) continue;
-        if (told[k] != 0) log_event(w, EventKind::drive_side, m.pairs + k, end, torque[k], 0, x);
-        told[k] = x;
-    }
-    // A loop that has become closed: one event, its members as a set of bits in place of the slip.
-    double& tie_up = w.next[m.layout.tie_up];
-    if (mode.redundant) w.outputs.certificate.flags |= 1;
-    if (mode.redundant && tie_up == 0) {
-        int first = -1;
-        double members = 0;
-        for (int k = std::min(m.pairs, most_members) - 1; k >= 0; --k) {
-            if (!(mode.bound[k] & shares_load)) continue;
-            members += std::ldexp(1., k);
-            first = k;
-        }
-        if (first >= 0)
-            log_event(w, EventKind::tie_up, first, end, s.torque[first], s.holding[first], members);
-    }
-    tie_up = mode.redundant ? 1 : 0;
-    if (w.outputs.certificate.fall_backs > 0) log_event(w, EventKind::fall_back, -1, end, 0, 0, 0);
 }
 
 }  // namespace
@@ -326,7 +298,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     certificate.constraint_violation = constraint_violation(mode, s.begin().z);
     certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
     if (!std::isfinite(s.stored)) certificate.flags |= 4;  // a sum over every speed and twist
-    report_changes(w, mode);
+    tell_step(w, mode);
     fill_outputs(w, mode, s.begin());
 
     OperatorsData& o = w.operators;

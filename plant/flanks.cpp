@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plant/telling.h"
 #include "plant/transitions.h"
 
 namespace shiftrig::plant::detail {
@@ -122,8 +123,12 @@ void change_flank(Work& w, const BacklashLaw& law, Sample& s) SHIFTRIG_REALTIME 
     const double next = side != 0 ? 0 : nearest_flank(w, law, {twist, rate}).side;
     state = closed_flank(next);
     w.scratch.dissipated += flank_energy(law, side, twist) - flank_energy(law, next, twist);
-    log_event(w, side == 0 ? EventKind::flank_closes : EventKind::flank_opens, law.device, s.at.time,
-              flank_torque(law, side + next, twist, rate), side + next, rate);
+    log_event(w, {.time = s.at.time,
+                  .kind = side == 0 ? EventKind::flank_closes : EventKind::flank_opens,
+                  .device = device_index(law.device),
+                  .torque = flank_torque(law, side + next, twist, rate),
+                  .slip = rate,
+                  .value = side + next});
 }
 
 }  // namespace shiftrig::plant::detail

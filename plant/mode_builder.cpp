@@ -83,6 +83,12 @@ static bool has_mesh_at_rest(const ModelData& m, const Mode& mode) {
                        [&](int k) { return mode.key[m.pairs + k] == 0 || mode.bound[m.pairs + k] != 0; });
 }
 
+bool wedges(const ModelData& m, const Mode& mode) SHIFTRIG_REALTIME {
+    bool found = false;
+    for (int k = 0; k < m.actuated_pairs; ++k) found = found || (!mode.key[k] && mode.bound[k]);
+    return found;
+}
+
 void list_row_links(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     mode.rests = has_mesh_at_rest(m, mode);
     for (int r = 0; r < mode.row_count; ++r) {
@@ -136,7 +142,7 @@ int workspace_doubles(const ModelData& m) noexcept {
 }
 
 int workspace_integers(const ModelData& m) noexcept {
-    return m.masses;
+    return std::max(m.masses, m.torques);
 }
 
 void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers) SHIFTRIG_REALTIME {
@@ -192,6 +198,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
     }
     const int rows = mode.row_count, rank = mode.rank;
     mode.redundant = rows > rank;
+    std::fill(mode.loop, mode.loop + m.pairs, 0);
 
     // Ĉ, its unknowns scaled to unit columns (square case) or by √W (dependent rows).
     double heaviest = 0;
@@ -248,14 +255,30 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
                 square[l * rank + k] = sum;
             }
         }
-        // A row that the others cannot replace has gᵀ(G Gᵀ)⁻¹g = 1; less means that it shares its load.
+        // A row that the others cannot replace has gᵀ(G Gᵀ)⁻¹g = 1; less means that it shares its load, with those where this
+        // product of both is not 0: they are in one loop.
         double* factor = transmission;  // not yet in use
+        int* const joined = integers;   // to which earlier row of its loop each row
+        for (int r = 0; r < rows; ++r) joined[r] = r;
+        const auto root = [joined](int r) {
+            while (joined[r] != r) r = joined[r];
+            return r;
+        };
         for (int r = 0; r < rows; ++r) {
             if (mode.rows[r] >= m.pairs) continue;
             std::copy(square, square + rank * rank, factor);
             std::copy(g + r * rank, g + (r + 1) * rank, column);
             solve(factor, rank, column, 1);
-            if (dot(g + r * rank, column, rank) < 1 - 1e-9) mode.bound[mode.rows[r]] |= shares_load;
+            if (dot(g + r * rank, column, rank) >= 1 - 1e-9) continue;
+            mode.bound[mode.rows[r]] |= shares_load;
+            for (int other = 0; other < rows; ++other) {
+                if (other == r || std::fabs(dot(g + other * rank, column, rank)) < 1e-9) continue;
+                const int one = root(r), two = root(other);
+                joined[std::max(one, two)] = std::min(one, two);
+            }
+        }
+        for (int r = 0; r < mode.first_mesh; ++r) {
+            if (mode.bound[mode.rows[r]] & shares_load) mode.loop[mode.rows[r]] = root(r) + 1;
         }
         solve(square, rank, right, n);
         for (int j = 0; j < n; ++j) {

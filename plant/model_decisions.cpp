@@ -127,6 +127,7 @@ void build_layout(ModelData& m) {
     at.engines = take(3 * static_cast<int>(m.engines.size()));
     at.sensors = take(4 * whole_panels(static_cast<int>(m.sensors.size())));
     at.tie_up = take(1);
+    at.loops = take(m.pairs);
     at.drive_sides = take(m.meshes);
     take(loop_slack);  // read, never written, by loops over what stands before it
     at.size = next;

@@ -42,6 +42,8 @@ struct Mode {
     int rank = 0;                  // with stuck meshes
     bool rests = false;            // some lossy mesh is at rest, stuck or bound
     bool redundant = false;        // more unknowns than independent rows: the split is not unique
+    bool wedges = false;           // others hold a pair at no slip that is not locked itself
+    int* loop = nullptr;           // per pair: in which loop of closed devices it shares a load, 0 none
     double* basis = nullptr;       // Q, masses × rank
     int order = 0;                 // number of coordinates
     int* coordinates = nullptr;    // q_i = z[coordinates[i]]
@@ -93,6 +95,8 @@ int coordinates_workspace(const ModelData& model) noexcept;
 
 // Mode::loss_share from its key and bound bits.
 void set_loss_shares(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
+
+bool wedges(const ModelData& model, const Mode& mode) SHIFTRIG_REALTIME;  // Mode::wedges
 
 // Mode::row_links from its rows, and Mode::rests.
 void list_row_links(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;

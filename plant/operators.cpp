@@ -32,7 +32,8 @@ OperatorsData::OperatorsData(const ModelData& m) {
     const auto rows = static_cast<std::size_t>(m.torques), states = static_cast<std::size_t>(m.states);
     const auto meshes = static_cast<std::size_t>(m.meshes);
     keys.assign(modes.size() * 2 * key_bytes, 0);
-    row_memory.assign(modes.size() * (rows + states), 0);
+    const std::size_t row_integers = rows + states + static_cast<std::size_t>(m.pairs);
+    row_memory.assign(modes.size() * row_integers, 0);
     link_memory.resize(modes.size() * rows);
     const std::size_t relations = meshes * static_cast<std::size_t>(m.tree ? 0 : m.contact_bytes);
     const std::size_t shares = static_cast<std::size_t>(whole_panels(m.meshes));  // zeros behind the last
@@ -41,8 +42,9 @@ OperatorsData::OperatorsData(const ModelData& m) {
     for (std::size_t i = 0; i < modes.size(); ++i) {
         modes[i].key = keys.data() + i * 2 * key_bytes;
         modes[i].bound = modes[i].key + key_bytes;
-        modes[i].rows = row_memory.data() + i * (rows + states);
+        modes[i].rows = row_memory.data() + i * row_integers;
         modes[i].coordinates = modes[i].rows + rows;
+        modes[i].loop = modes[i].coordinates + states;
         modes[i].row_links = link_memory.data() + i * rows;
         modes[i].loss_share = share_memory.data() + i * (shares + meshes);
         modes[i].family_mobility = modes[i].loss_share + shares;
@@ -152,6 +154,7 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
         }
     }
     list_row_links(m, *oldest);
+    oldest->wedges = wedges(m, *oldest);
     return found(*oldest);
 }
 

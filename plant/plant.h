@@ -55,18 +55,30 @@ enum class EventKind : std::uint8_t {
     facing_failure,
     flank_closes,
     flank_opens,  // shafts with play
+    untold,       // more changes in this step than it can tell
 };
 
-// Why a state changed ([Algin] eq. (12), (13)); margin = capacity − |torque| at the event.
+// Why a state changed ([Algin] eq. (12), (13)).
 struct Event {
     double time = 0;  // [s], inside the step
     EventKind kind{};
     std::int16_t device = -1;  // index into model.device_names(), −1: none
-    double torque = 0;         // [Nm] on the first link
-    // [Nm] static capacity for lock/break_away; what the loss allows for a stuck mesh; +1 or −1, which flank it is
-    double capacity = 0;
-    double slip = 0;  // [rad/s]
+    // [Nm] on the first link; of a mesh at rest: what its loss has to take to stay so. [N] on a body that moves straight on
+    double torque = 0;
+    double capacity = 0;  // [Nm] static, sliding where it engages; what the loss of a mesh at rest allows
+    double slip = 0;      // [rad/s]
+    // drive_side: x; flanks: +1 or −1, which one; engines: speed [rad/s]; facings: temperature [°C]; mesh_releases: 1 where it only
+    // passes through rest; untold: how many
+    double value = 0;
+    // tie_up: bit i of pair `device` + i, which shares the load; the last bit: so do others further away.
+    std::uint64_t members = 0;
 };
+// Is a torque compared with a capacity in this event? Then `margin` is what is left of it, negative beyond it [Nm].
+bool has_margin(EventKind kind) noexcept;
+inline double margin(const Event& event) noexcept {
+    return event.capacity - (event.torque < 0 ? -event.torque : event.torque);
+}
+constexpr int most_members = 63;
 
 // In words: `t=1.2034517 F2 locks: slip 0, torque 812.4 of 2569.3 Nm static`.
 class Model;
@@ -139,7 +151,8 @@ struct Outputs {
     explicit Outputs(const Model& model);
     std::vector<double> value;  // by model.output(name), at the end of the step
     Certificate certificate;
-    int event_count = 0;  // of this step; beyond the capacity they are only counted
+    int event_count =
+        0;  // of this step; beyond the capacity they are only counted, the last one kept says how many
     std::array<Event, event_capacity> events;
 };
 

@@ -8,6 +8,7 @@
 #include "plant/rest_problem.h"
 #include "plant/standstill.h"
 #include "plant/stuck_meshes.h"
+#include "plant/telling.h"
 
 namespace shiftrig::plant::detail {
 namespace {
@@ -21,12 +22,13 @@ bool engage_and_release(Work& w, Sample& s) {
         if (capable != (w.contact[k] == free_running)) continue;
         const double slip = slip_of(pair_links(w, k), s.z);
         if (!capable && w.contact[k] != free_running) {
-            log_event(w, EventKind::release, k, s.at.time, 0, 0, slip);  // nothing presses it any more
+            log_event(w, {s.at.time, EventKind::release, device_index(k), 0, 0,
+                          slip});  // nothing presses it any more
             w.contact[k] = free_running;
             changed = true;
         } else if (capable && w.contact[k] == free_running) {
             if (std::fabs(slip) > at_rest) {
-                log_event(w, EventKind::engage, k, s.at.time, 0, s.sliding[k], slip);
+                log_event(w, {s.at.time, EventKind::engage, device_index(k), 0, s.sliding[k], slip});
                 w.contact[k] = slipping(slip);
             } else {
                 change_state(w, k, s);
@@ -36,21 +38,6 @@ bool engage_and_release(Work& w, Sample& s) {
     }
     if (changed) contact_forces(w, w.contact, s);
     return changed;
-}
-
-// Closings are told with the torques that they lead to.
-void tell_closings(Work& w, const Sample& s) {
-    const int count = std::min(w.outputs.event_count, Outputs::event_capacity);
-    for (int& i = w.scratch.told_events; i < count; ++i) {
-        Event& event = w.outputs.events[static_cast<std::size_t>(i)];
-        if (event.kind == EventKind::lock) {
-            event.torque = s.torque[event.device];
-        } else if (event.kind == EventKind::mesh_sticks) {
-            const LossAtRest loss = loss_at_rest(w, event.device - w.model.pairs, s);
-            event.torque = loss.needed;
-            event.capacity = loss.allowed;
-        }
-    }
 }
 
 }  // namespace
@@ -103,7 +90,8 @@ void open_pair(Work& w, const Mode& mode, int pair, Sample& s) SHIFTRIG_REALTIME
     for (int k = w.model.pairs; k < w.model.first_flank; ++k) {
         if (mode.bound[k] && mesh_of(w, k - w.model.pairs).lossy()) w.contact[k] = stuck;
     }
-    log_event(w, EventKind::break_away, pair, s.at.time, s.torque[pair], static_limit(w, pair, s), 0);
+    log_event(
+        w, {s.at.time, EventKind::break_away, device_index(pair), s.torque[pair], static_limit(w, pair, s)});
     w.contact[pair] = slipping(opening_sense(w, pair, s.torque[pair], s));
     w.scratch.overcome[static_cast<std::size_t>(pair)] = 1;
     contact_forces(w, w.contact, s);
@@ -167,7 +155,7 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
                 continue;
             }
         }
-        if (w.scratch.told_events < w.outputs.event_count) tell_closings(w, s);
+        if (w.scratch.told_events < w.outputs.event_count) tell_closings(w, mode, s);
         std::fill(w.scratch.overcome.begin(), w.scratch.overcome.end(), static_cast<unsigned char>(0));
         return mode;
     }

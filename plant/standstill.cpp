@@ -7,6 +7,7 @@
 #include "plant/rest_problem.h"
 #include "plant/settling.h"
 #include "plant/stuck_meshes.h"
+#include "plant/telling.h"
 #include "plant/transitions.h"
 
 namespace shiftrig::plant::detail {
@@ -165,14 +166,14 @@ struct Search {
             if (was == is) continue;
             if (pair) {
                 const double limit = was ? static_limit(w, k, s) : s.holding[k];
-                log_event(w, was ? EventKind::break_away : EventKind::lock, k, s.at.time, s.torque[k], limit,
-                          0);
+                log_event(w, {s.at.time, was ? EventKind::break_away : EventKind::lock, device_index(k),
+                              s.torque[k], limit});
                 if (was) overcome(k) = 1;
             } else if (was) {
                 const LossAtRest loss = loss_at_rest(w, k - w.model.pairs, s);
-                log_event(w, EventKind::mesh_releases, k, s.at.time, loss.needed, loss.allowed, 0);
+                log_release(w, k, s.at.time, loss);
             } else {
-                log_event(w, EventKind::mesh_sticks, k, s.at.time, 0, 0, 0);
+                log_event(w, {s.at.time, EventKind::mesh_sticks, device_index(k)});
             }
         }
     }

@@ -11,6 +11,7 @@
 #include "plant/forces.h"
 #include "plant/ledger.h"
 #include "plant/refinement.h"
+#include "plant/telling.h"
 #include "plant/transitions.h"
 
 namespace shiftrig::plant {
@@ -151,6 +152,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     // Torque capacities, external torques, internal torques, power-flow directions, internal torques with
     // losses ([Algin] eq. (11), (14), (15), (16)–(25)); what cannot hold at t0+ opens (eq. (12)).
     Mode* mode = &begin_mode(w);
+    if (state.steps() == 0) tell_resting(w, *mode, s.begin());
 
     double length = 1;             // of a part, at most
     int leans = m.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
@@ -217,7 +219,12 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
             if (moves || --leans < 0) ++outputs.certificate.events;
         } else if (first.device >= 0 && first.change != Change::turn && first.change != Change::limit) {
             if (!acts_by_itself(first.change)) change_all(w, *mode, s.begin());
-            outputs.certificate.fall_backs += localise;
+            if (localise) {
+                ++outputs.certificate.fall_backs;
+                log_event(w, {.time = s.begin().at.time,
+                              .kind = EventKind::fall_back,
+                              .device = device_index(first.device)});
+            }
         }
         if (done < 1 || first.device >= 0) {
             mode = &settle(w, s.begin());

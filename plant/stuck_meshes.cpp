@@ -8,6 +8,7 @@
 #include "plant/rest_problem.h"
 #include "plant/settling.h"
 #include "plant/standstill.h"
+#include "plant/telling.h"
 
 namespace shiftrig::plant::detail {
 namespace {
@@ -149,6 +150,35 @@ LossAtRest loss_at_rest(const Work& w, int k, const Sample& s) SHIFTRIG_REALTIME
     return {needed, allowed};
 }
 
+LossAtRest family_loss_at_rest(Work& w, const Mode& mode, int mesh, Sample& s) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const auto alone = [&] {
+        LossAtRest loss = loss_at_rest(w, mesh, s);
+        loss.needed = std::fabs(loss.needed);
+        return loss;
+    };
+    const signed char* part = w.scratch.family.data();
+    for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
+        const int leader = mode.rows[r] - m.pairs - m.meshes;
+        const double mobility = find_family(w, mode, leader, w.scratch.family.data());
+        if (mobility == 0 || (mesh != leader && part[m.pairs + mesh] == 0)) continue;
+        int members = 0;
+        for (int k = 0; k < m.first_flank; ++k) members += part[k] != 0;
+        if (members <= 1) return alone();
+        const Certificate kept = w.outputs.certificate;  // what is only told does not count
+        std::fill(s.rate, s.rate + m.states, 0.);        // where nothing can be tried
+        const double drive = release_drive(w, mode, leader, s);
+        w.outputs.certificate = kept;
+        const double of_leader = slip_of(mesh_of(w, leader).motion(), s.rate),
+                     of_mesh = slip_of(mesh_of(w, mesh).motion(), s.rate);
+        if (of_mesh == 0) return alone();
+        const double needed = std::fabs(s.torque[m.pairs + m.meshes + leader]),
+                     ratio = std::fabs(of_leader / of_mesh);
+        return {needed * ratio, std::max(0., needed - drive / (mobility * mobility)) * ratio};
+    }
+    return alone();
+}
+
 double loss_left(const Work& w, int mesh, const Sample& s) SHIFTRIG_REALTIME {
     const LossAtRest loss = loss_at_rest(w, mesh, s);
     return loss.allowed - std::fabs(loss.needed);
@@ -193,7 +223,7 @@ bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         }
         if (taker >= 0) {
             std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);
-            log_event(w, EventKind::lock, taker, s.at.time, 0, s.holding[taker], 0);
+            log_event(w, {s.at.time, EventKind::lock, device_index(taker), 0, s.holding[taker]});
         }
         contact_forces(w, w.contact, s);
         if (taker >= 0) return true;
@@ -208,12 +238,13 @@ namespace {
 bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
     if (release_drive(w, mode, leader, s) <= 0) return false;
     const ModelData& m = w.model;
+    unsigned char* const release = w.scratch.changed.data();  // to tell of it tries again
+    std::copy(w.scratch.release.begin(), w.scratch.release.begin() + m.contact_bytes, release);
     for (int k = m.pairs; k < m.first_flank; ++k) {
-        if (w.contact[k] != stuck || w.scratch.release[static_cast<std::size_t>(k)] == stuck) continue;
-        const LossAtRest loss = loss_at_rest(w, k - m.pairs, s);
-        log_event(w, EventKind::mesh_releases, k, s.at.time, loss.needed, loss.allowed, 0);
+        if (w.contact[k] != stuck || release[k] == stuck) continue;
+        log_release(w, k, s.at.time, family_loss_at_rest(w, mode, k - m.pairs, s));
     }
-    std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);
+    std::copy(release, release + m.contact_bytes, w.contact);
     contact_forces(w, w.contact, s);
     return true;
 }

@@ -10,6 +10,9 @@ struct LossAtRest {
     double needed, allowed;
 };
 LossAtRest loss_at_rest(const Work& work, int mesh, const Sample& sample) SHIFTRIG_REALTIME;
+// The same with all that moves with it: what all the losses of that motion would have to be, as a torque at this mesh, and what
+// they can be.
+LossAtRest family_loss_at_rest(Work& work, const Mode& mode, int mesh, Sample& sample) SHIFTRIG_REALTIME;
 // What is left of the loss that a stuck mesh can take [Nm].
 double loss_left(const Work& work, int mesh, const Sample& sample) SHIFTRIG_REALTIME;
 

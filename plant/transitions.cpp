@@ -7,6 +7,7 @@
 #include "plant/ledger.h"
 #include "plant/settling.h"
 #include "plant/standstill.h"
+#include "plant/telling.h"
 
 namespace shiftrig::plant::detail {
 namespace {
@@ -19,8 +20,8 @@ void close_device(Work& w, int device, Sample& s) {
     const auto capacity = [&](int k) { return k < m.pairs ? s.holding[k] : 0.; };
     const auto set = [&](int k) {
         w.contact[k] = k < m.pairs ? static_cast<unsigned char>(locked) : static_cast<unsigned char>(stuck);
-        log_event(w, k < m.pairs ? EventKind::lock : EventKind::mesh_sticks, k, s.at.time, s.torque[k],
-                  capacity(k), device_slip(w, k, s.z));
+        log_event(w, {s.at.time, k < m.pairs ? EventKind::lock : EventKind::mesh_sticks, device_index(k),
+                      s.torque[k], capacity(k), device_slip(w, k, s.z)});
     };
     set(device);
     const Mode& mode = find_mode(m, w.operators, w.contact, w.scratch);
@@ -38,14 +39,6 @@ void close_device(Work& w, int device, Sample& s) {
 }
 
 }  // namespace
-
-void log_event(Work& w, EventKind kind, int device, double time, double torque, double capacity,
-               double slip) SHIFTRIG_REALTIME {
-    const int index = w.outputs.event_count++;
-    if (index >= Outputs::event_capacity) return;
-    w.outputs.events[static_cast<std::size_t>(index)] = {time,   kind,     static_cast<std::int16_t>(device),
-                                                         torque, capacity, slip};
-}
 
 void sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     if (mode.tree) return tree_sample_rate(w, mode, s);
@@ -150,14 +143,18 @@ void change_all(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         w.scratch.dissipated += flank_energy(law, side, twist);
         twist = side * law.half_gap;
     }
-    unsigned char* list = w.scratch.violations.data();
-    for (int k = 0; k < w.model.first_flank; ++k) list[k] = violated(w, mode, k, s);
+    const auto is_closed = [&](int k) {
+        return k < w.model.pairs ? w.contact[k] == locked : w.contact[k] == stuck;
+    };
+    enum Verdict : unsigned char { good, opens, closes };
+    unsigned char* verdict = w.scratch.violations.data();
+    for (int k = 0; k < w.model.first_flank; ++k)
+        verdict[k] = !violated(w, mode, k, s) ? good : is_closed(k) ? opens : closes;
     for (int k = 0; k < w.model.first_flank; ++k) {
-        const bool closed = k < w.model.pairs ? w.contact[k] == locked : w.contact[k] == stuck;
-        if (!list[k]) continue;
-        if (k < w.model.pairs && closed) {
+        // One that closes may have brought others to rest with it: these are where they were to go.
+        if (verdict[k] == opens && k < w.model.pairs) {
             open_pair(w, find_mode(w.model, w.operators, w.contact, w.scratch), k, s);
-        } else if (!closed) {
+        } else if (verdict[k] == closes && !is_closed(k)) {
             close_device(w, k, s);
         }
     }

@@ -74,10 +74,4 @@ double join(Work& work, const Mode& mode, double* speeds) SHIFTRIG_REALTIME;
 // ż = L z + S̃ f of the sample.
 void sample_rate(const Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
-// Members of a closed loop are told as bits of a double (Event::slip of a tie-up): pair k is 2^k.
-constexpr int most_members = 52;
-
-void log_event(Work& work, EventKind kind, int device, double time, double torque, double capacity,
-               double slip) SHIFTRIG_REALTIME;
-
 }  // namespace shiftrig::plant::detail

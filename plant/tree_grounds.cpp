@@ -11,6 +11,11 @@ namespace {
 // Closed pairs whose torques are not unique: each of two or more that hold a group, and those between them.
 void find_shared_loads(const ModelData& m, Mode& mode, TreeMode& t) {
     const TreeTopology& topology = *m.tree;
+    // All that hold one group at rest are in one loop, which the housing closes.
+    const auto share = [&](int pair, int position) {
+        mode.bound[pair] |= shares_load;
+        mode.loop[pair] = t.group[position] + 1;
+    };
     // How many hold the part of its group that lies beyond a position.
     double* held = t.network_inverse;  // not yet in use
     std::fill(held, held + m.masses, 0.);
@@ -22,11 +27,11 @@ void find_shared_loads(const ModelData& m, Mode& mode, TreeMode& t) {
     for (int p = 0; p < m.masses; ++p) {
         const TreeTopology::Edge& edge = topology.edges[static_cast<std::size_t>(p)];
         if (edge.rigid >= m.pairs || !is_active(m, mode, edge)) continue;
-        if (held[p] > 0 && held[p] < held[t.first[t.group[p]]]) mode.bound[edge.rigid] |= shares_load;
+        if (held[p] > 0 && held[p] < held[t.first[t.group[p]]]) share(edge.rigid, p);
     }
     for (int i = 0; i < t.ground_count; ++i) {
         if (t.ground_unknown[i] < m.pairs && held[t.first[t.group[t.ground_position[i]]]] > 1)
-            mode.bound[t.ground_unknown[i]] |= shares_load;
+            share(t.ground_unknown[i], t.ground_position[i]);
     }
 }
 
@@ -40,6 +45,7 @@ void find_grounds(const ModelData& m, Mode& mode, TreeMode& t) SHIFTRIG_REALTIME
     const TreeTopology& topology = *m.tree;
     t.ground_count = 0;
     mode.redundant = false;
+    std::fill(mode.loop, mode.loop + m.pairs, 0);
     const auto hold = [&](int position, int unknown, double factor) {
         t.ground_position[t.ground_count] = position;
         t.ground_unknown[t.ground_count] = unknown;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "io/recording/event_json.h"
 #include "io/recording/event_names.h"
 
 namespace shiftrig::rig {
@@ -98,7 +99,8 @@ analysis::Run Collector::finish(const Rig& rig) {
     for (const auto& event : plant_events_)
         run.changes.push_back({event,
                                event.device >= 0 ? devices[static_cast<std::size_t>(event.device)] : "",
-                               plant::explain(rig.model(), event), std::string(io::name(event.kind))});
+                               plant::explain(rig.model(), event), std::string(io::name(event.kind)),
+                               io::loop_members(event, devices)});
     for (const auto& event : rig_events_) {
         analysis::Change change;
         change.event.time = event.time;

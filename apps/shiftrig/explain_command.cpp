@@ -7,7 +7,7 @@
 #include "analysis/load_run.h"
 #include "apps/shiftrig/command.h"
 #include "io/nearest.h"
-#include "io/recording/event_names.h"
+#include "io/recording/event_json.h"
 #include "io/recording/reader.h"
 
 namespace shiftrig::cli {
@@ -39,12 +39,12 @@ int run(const Options& options) {
             std::cout << change.text << '\n';
             continue;
         }
-        list.push_back({{"time_s", change.event.time}, {"device", change.device}, {"text", change.text}});
-        if (change.device.empty()) continue;
-        list.back()["kind"] = io::name(change.event.kind);
-        list.back()["torque_nm"] = change.event.torque;
-        list.back()["capacity_nm"] = change.event.capacity;
-        list.back()["slip_rad_s"] = change.event.slip;
+        if (change.device.empty()) {
+            list.push_back({{"time_s", change.event.time}, {"device", ""}, {"text", change.text}});
+        } else {
+            list.push_back(io::event_json(change.event, change.device, change.members));
+            list.back()["text"] = change.text;
+        }
     }
     if (options.json) std::cout << list.dump(2) << '\n';
     for (const auto& [what, text] : recorded.identity)

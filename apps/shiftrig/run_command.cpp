@@ -20,6 +20,7 @@
 #include "apps/shiftrig/loop_report.h"
 #include "apps/shiftrig/rig_options.h"
 #include "io/recording/csv.h"
+#include "io/recording/event_json.h"
 #include "io/recording/reader.h"
 #include "io/recording/snapshot.h"
 #include "rt/machine.h"
@@ -93,12 +94,10 @@ Beside prepare(const RunOptions& options, const rig::Rig& rig, const rt::LoopSet
 }
 
 nlohmann::json event_json(const analysis::Change& change) {
-    nlohmann::json event = {{"time_s", change.event.time}, {"kind", change.kind}, {"text", change.text}};
-    if (change.device.empty()) return event;
-    event["device"] = change.device;
-    event["torque_nm"] = change.event.torque;
-    event["capacity_nm"] = change.event.capacity;
-    event["slip_rad_s"] = change.event.slip;
+    nlohmann::json event = {{"time_s", change.event.time}};
+    if (!change.device.empty()) event = io::event_json(change.event, change.device, change.members);
+    event["kind"] = change.kind;
+    event["text"] = change.text;
     return event;
 }
 

@@ -40,6 +40,8 @@ inline std::string_view name(plant::EventKind kind) {
             return "flank_closes";
         case K::flank_opens:
             return "flank_opens";
+        case K::untold:
+            return "untold";
     }
     return "unknown";
 }

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/recording/csv.h"
-#include "io/recording/event_names.h"
+#include "io/recording/event_json.h"
 #include "io/recording/mcap_file.h"
 
 namespace shiftrig::io {
@@ -53,6 +53,7 @@ const json event_schema = {{"type", "object"},
                              {"device", {{"type", "string"}}},
                              {"torque_nm", {{"type", "number"}, {"unit", "Nm"}}},
                              {"capacity_nm", {{"type", "number"}, {"unit", "Nm"}}},
+                             {"margin_nm", {{"type", "number"}, {"unit", "Nm"}}},
                              {"slip_rad_s", {{"type", "number"}, {"unit", "rad/s"}}}}}};
 
 }  // namespace
@@ -105,13 +106,7 @@ std::int64_t export_mcap(RecordingReader& reader, const std::string& path) {
             const std::string device =
                 event.device < 0 ? "" : m.devices[static_cast<std::size_t>(event.device)];
             file.add_message(events, sequence, time,
-                             json{{"time_s", event.time},
-                                  {"kind", name(event.kind)},
-                                  {"device", device},
-                                  {"torque_nm", event.torque},
-                                  {"capacity_nm", event.capacity},
-                                  {"slip_rad_s", event.slip}}
-                                 .dump());
+                             event_json(event, device, loop_members(event, m.devices)).dump());
         }
     }
     file.close();

@@ -274,8 +274,10 @@ bool RecordingReader::Implementation::next(RecordedTick& tick) {
             happened.torque = e.torque_nm;
             happened.capacity = e.capacity_nm;
             happened.slip = e.slip_rad_s;
+            happened.value = e.value;
+            happened.members = std::bit_cast<std::uint64_t>(e.members);
             if (e.device < -1 || e.device >= static_cast<std::int64_t>(manifest.devices.size()) ||
-                e.kind < 0 || e.kind > static_cast<std::int32_t>(plant::EventKind::flank_opens))
+                e.kind < 0 || e.kind > static_cast<std::int32_t>(plant::EventKind::untold))
                 return damaged("an event of an unknown device or kind");
             tick.events.push_back(happened);
         } else if (event.channel == channel::record_timing) {

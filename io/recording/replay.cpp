@@ -37,12 +37,13 @@ std::string words(const std::vector<std::string>& devices, const plant::Event& e
     return std::string(name(e.kind)) +
            (e.device < 0 ? "" : " of " + devices.at(static_cast<std::size_t>(e.device))) + " at " +
            digits(e.time) + " s, torque " + digits(e.torque) + ", capacity " + digits(e.capacity) +
-           ", slip " + digits(e.slip);
+           ", slip " + digits(e.slip) + (e.value == 0 ? "" : ", value " + digits(e.value));
 }
 
 bool same_event(const plant::Event& a, const plant::Event& b) {
     return a.kind == b.kind && a.device == b.device && same_bits(a.time, b.time) &&
-           same_bits(a.torque, b.torque) && same_bits(a.capacity, b.capacity) && same_bits(a.slip, b.slip);
+           same_bits(a.torque, b.torque) && same_bits(a.capacity, b.capacity) && same_bits(a.slip, b.slip) &&
+           same_bits(a.value, b.value) && a.members == b.members;
 }
 
 // The plant under the recorded inputs.

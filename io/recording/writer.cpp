@@ -213,6 +213,8 @@ void RecordingWriter::Implementation::encode(const TickQueue::View& view) {
         event.torque_nm = happened.torque;
         event.capacity_nm = happened.capacity;
         event.slip_rad_s = happened.slip;
+        event.value = happened.value;
+        event.members = std::bit_cast<std::int64_t>(happened.members);
         append(channel::record_event, event);
     }
     if (wall_clock) {

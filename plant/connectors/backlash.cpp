@@ -42,7 +42,7 @@ double* show(const detail::Shown& at, const std::vector<Backlash>&, double* next
 }
 
 std::string in_words(const Backlash&, const Event& event) {
-    const char* flank = event.capacity > 0 ? "forward" : "backward";
+    const char* flank = event.value > 0 ? "forward" : "backward";
     if (event.kind == EventKind::flank_closes)
         return format("closes its %s flank at %.3f rad/s", flank, event.slip);
     if (event.kind == EventKind::flank_opens)

@@ -222,9 +222,9 @@ double* show(const detail::Shown& at, const std::vector<Clutch>& clutches, doubl
 
 std::string in_words(const Clutch&, const Event& event) {
     if (event.kind == EventKind::facing_warning)
-        return format("facing passes its warning temperature: %.0f degC", event.slip);
+        return format("facing passes its warning temperature: %.0f degC", event.value);
     if (event.kind == EventKind::facing_failure)
-        return format("facing passes its failure temperature: %.0f degC", event.slip);
+        return format("facing passes its failure temperature: %.0f degC", event.value);
     return {};
 }
 

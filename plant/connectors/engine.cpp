@@ -82,8 +82,8 @@ double* show(const detail::Shown& at, const std::vector<Engine>& engines, double
 }
 
 std::string in_words(const Engine&, const Event& event) {
-    if (event.kind == EventKind::engine_stalls) return format("stalls at %.1f rad/s", event.slip);
-    if (event.kind == EventKind::engine_starts) return format("runs at %.1f rad/s", event.slip);
+    if (event.kind == EventKind::engine_stalls) return format("stalls at %.1f rad/s", event.value);
+    if (event.kind == EventKind::engine_starts) return format("runs at %.1f rad/s", event.value);
     return {};
 }
 

@@ -59,6 +59,8 @@ std::string summary_of(const std::string& scenario) {
             add(event.torque);
             add(event.capacity);
             add(event.slip);
+            add(event.value);
+            add(event.members);
         }
         if ((tick + 1) % sample_every != 0 && tick + 1 != ticks) continue;
         chain = io::sha256(chain + bytes);

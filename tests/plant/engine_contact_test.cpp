@@ -250,17 +250,6 @@ TEST(Standstill, ABrakeHoldsALoadWithoutCreepAndLetsItGoAboveItsCapacity) {
     EXPECT_NEAR(rig.out("mass.drum.speed"), -11. / 3 * 1e-3, 1e-12);
 }
 
-std::vector<std::string> told(Rig& rig, double seconds) {
-    std::vector<std::string> lines;
-    for (const double end = rig.state.time() + seconds; rig.state.time() < end - 1e-9;) {
-        rig.step();
-        for (int e = 0; e < rig.outputs.event_count; ++e) {
-            lines.push_back(explain(rig.model, rig.outputs.events[static_cast<std::size_t>(e)]));
-        }
-    }
-    return lines;
-}
-
 // The second brake would need 51 Nm of its 49.6, but for the mesh in front of it, whose loss takes the rest. That the first
 // one, behind a shaft, is torn loose in the same instant is nothing to it.
 TEST(Standstill, WhatNothingRigidJoinsSettlesForItself) {
@@ -280,56 +269,6 @@ TEST(Standstill, WhatNothingRigidJoinsSettlesForItself) {
         EXPECT_EQ(rig.out("mass.held.speed"), 0);
         EXPECT_NEAR(rig.out("mass.torn.speed"), 0.193, 1e-3);
     }
-}
-
-TEST(Explain, AClosingClutchIsToldWithTheTorqueItCarriesFromThenOn) {
-    Description d = two_inertias();
-    d.sources = {source("fast", constant(36))};  // M12 = 36·1/(2.6 + 1)
-    Rig rig(d);
-    const auto lines = told(rig, 0.2);
-    ASSERT_FALSE(lines.empty());
-    EXPECT_EQ(lines.back().find("t=0.0913684 C locks: slip "), 0u) << lines.back();
-    EXPECT_NE(lines.back().find(", torque 10.0 of 1500.0 Nm static"), std::string::npos) << lines.back();
-}
-
-// η = 0.5, u = 1: a drives with 10 Nm, 8 Nm on b resist. Moving, M = 12 and ω̇ = −2 rad/s²; at rest M = 10, of which the
-// mesh keeps 2 from b and could keep 5. Without the drive M = 0, no loss, and b is free to go.
-TEST(Explain, AStuckMeshIsToldWithWhatItNeedsAndWhatItsLossAllows) {
-    Description d;
-    d.name = "gear";
-    d.masses = {mass("a", 1, 1), mass("b", 1, 1)};
-    Gear gear;
-    gear.name = "g", gear.a = "a", gear.b = "b", gear.ratio = 1, gear.efficiency = 0.5;
-    d.gears = {gear};
-    TorqueSource drive = source("a", constant(10));
-    drive.waveform.pieces[0].until = 0.6;
-    d.sources = {drive, source("b", constant(-8))};
-    Rig rig(d);
-    EXPECT_EQ(told(rig, 0.7),
-              (std::vector<std::string>{
-                  "t=0.5000000 g sticks: rest needs 2.0 Nm of its loss, which allows 5.0",
-                  "t=0.6000000 g moves again: rest would need 8.0 Nm of its loss, which allows 0.0",
-                  "t=0.6010000 g is driven: torque on its first link 2.7 Nm"}));
-}
-
-// A pinion that nothing loads turns its power to and fro with every swing; the loaded one is told once a reversal.
-TEST(Explain, AReversalOfPowerIsToldOnceTheMeshIsLoaded) {
-    Description d;
-    d.name = "two pinions";
-    d.masses = {mass("a", 1, 100), mass("b", 1, 100), mass("idle", 1e-3, 100)};
-    Gear loaded, idle;
-    loaded.name = "g", loaded.a = "a", loaded.b = "b", loaded.ratio = 1, loaded.efficiency = 0.98;
-    idle = loaded;
-    idle.name = "idling", idle.a = "idle";
-    d.gears = {loaded, idle};
-    d.clutches = {clutch("C", "idle", "", 50, 1, ActuationDirect{{}, 0})};
-    Waveform wave;
-    wave.pieces = {{.amplitude = 20, .frequency = 5}};
-    d.sources = {source("a", wave)};
-    Rig rig(d);
-    const auto lines = told(rig, 0.4);
-    ASSERT_EQ(lines.size(), 3u);  // at 0.1, 0.2 and 0.3 s, as soon as 0.5 Nm are on it
-    for (const auto& line : lines) EXPECT_NE(line.find(" g "), std::string::npos) << line;
 }
 
 }  // namespace

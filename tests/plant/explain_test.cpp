@@ -1,0 +1,174 @@
+// What the plant says of each change of state.
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/plant/rig.h"
+
+namespace shiftrig::plant {
+namespace {
+
+Description driven_to_rest() {
+    Description d;
+    d.name = "two inertias";
+    d.masses = {mass("fast", 2.6, 188.5), mass("slow", 1.0)};
+    d.clutches = {clutch("C", "fast", "slow", 1500)};
+    return d;
+}
+
+std::vector<std::string> told(Rig& rig, double seconds) {
+    std::vector<std::string> lines;
+    for (const double end = rig.state.time() + seconds; rig.state.time() < end - 1e-9;) {
+        rig.step();
+        for (int e = 0; e < rig.outputs.event_count; ++e) {
+            lines.push_back(explain(rig.model, rig.outputs.events[static_cast<std::size_t>(e)]));
+        }
+    }
+    return lines;
+}
+
+TEST(Explain, AClosingClutchIsToldWithTheTorqueItCarriesFromThenOn) {
+    Description d = driven_to_rest();
+    d.sources = {source("fast", constant(36))};  // M12 = 36·1/(2.6 + 1)
+    Rig rig(d);
+    const auto lines = told(rig, 0.2);
+    ASSERT_FALSE(lines.empty());
+    EXPECT_EQ(lines.back().find("t=0.0913684 C locks: slip "), 0u) << lines.back();
+    EXPECT_NE(lines.back().find(", torque 10.0 of 1500.0 Nm static"), std::string::npos) << lines.back();
+}
+
+// η = 0.5, u = 1: a drives with 10 Nm, 8 Nm on b resist. Moving, M = 12 and ω̇ = −2 rad/s²; at rest M = 10, of which the
+// mesh keeps 2 from b and could keep 5. Without the drive M = 0, no loss, and b is free to go.
+TEST(Explain, AStuckMeshIsToldWithWhatItNeedsAndWhatItsLossAllows) {
+    Description d;
+    d.name = "gear";
+    d.masses = {mass("a", 1, 1), mass("b", 1, 1)};
+    Gear gear;
+    gear.name = "g", gear.a = "a", gear.b = "b", gear.ratio = 1, gear.efficiency = 0.5;
+    d.gears = {gear};
+    TorqueSource drive = source("a", constant(10));
+    drive.waveform.pieces[0].until = 0.6;
+    d.sources = {drive, source("b", constant(-8))};
+    Rig rig(d);
+    EXPECT_EQ(told(rig, 0.7),
+              (std::vector<std::string>{
+                  "t=0.5000000 g sticks: rest needs 2.0 Nm of its losses, which allow 5.0",
+                  "t=0.6000000 g moves again: rest would need 8.0 Nm of its losses, which allow 0.0",
+                  "t=0.6010000 g is driven: torque on its first link 2.7 Nm"}));
+}
+
+// A pinion that nothing loads turns its power to and fro with every swing; the loaded one is told once a reversal.
+TEST(Explain, AReversalOfPowerIsToldOnceTheMeshIsLoaded) {
+    Description d;
+    d.name = "two pinions";
+    d.masses = {mass("a", 1, 100), mass("b", 1, 100), mass("idle", 1e-3, 100)};
+    Gear loaded, idle;
+    loaded.name = "g", loaded.a = "a", loaded.b = "b", loaded.ratio = 1, loaded.efficiency = 0.98;
+    idle = loaded;
+    idle.name = "idling", idle.a = "idle";
+    d.gears = {loaded, idle};
+    d.clutches = {clutch("C", "idle", "", 50, 1, ActuationDirect{{}, 0})};
+    Waveform wave;
+    wave.pieces = {{.amplitude = 20, .frequency = 5}};
+    d.sources = {source("a", wave)};
+    Rig rig(d);
+    const auto lines = told(rig, 0.4);
+    ASSERT_EQ(lines.size(), 3u);  // at 0.1, 0.2 and 0.3 s, as soon as 0.5 Nm are on it
+    for (const auto& line : lines) EXPECT_NE(line.find(" g "), std::string::npos) << line;
+}
+
+// The same gear, never in motion: it is told when the run begins, once.
+TEST(Explain, AMeshAtRestFromTheBeginningIsTold) {
+    Description d;
+    d.name = "gear";
+    d.masses = {mass("a", 1), mass("b", 1)};
+    d.gears = {lossy_gear("g", "a", "b", 1, 0.5, 0)};
+    d.sources = {source("a", constant(10)), source("b", constant(-8))};
+    for (const Method method : {Method::etd3, Method::ark3}) {
+        d.method = method;
+        Rig rig(d);
+        EXPECT_EQ(told(rig, 0.5),
+                  (std::vector<std::string>{
+                      "t=0.0000000 g sticks: rest needs 2.0 Nm of its losses, which allow 5.0"}));
+    }
+}
+
+// Two gears of ratio 1 in a row are one motion. 10 Nm drive, and its mass is all at rest: η² = 0.25 of them come
+// through, so that 2.5 … 10 Nm at the end are held. With 8 of these, 2 are needed; what is not there is not told of either gear.
+TEST(Explain, GearsOfOneMotionAreToldWithAllTheirLosses) {
+    Description d;
+    d.name = "two gears";
+    d.masses = {mass("a", 1), mass("b", 1), mass("c", 1)};
+    d.gears = {lossy_gear("g", "a", "b", 1, 0.5, 0), lossy_gear("h", "b", "c", 2, 0.5, 0)};
+    TorqueSource load = source("c", constant(-16));
+    load.input = true;
+    d.sources = {source("a", constant(10)), load};
+    Rig rig(d);
+    rig.step();
+    ASSERT_EQ(rig.events.size(), 2u);
+    // At g 2 are needed; as they go, b and c take 10 · 0.5 and, behind h, 5 · 2 · 0.5 of the 16: 5.5 more than drives them.
+    EXPECT_NEAR(rig.events[0].torque, 2, 1e-9);
+    EXPECT_NEAR(rig.events[1].torque, 2 / 1., 1e-9);
+    for (const Event& event : rig.events) {
+        EXPECT_EQ(event.kind, EventKind::mesh_sticks);
+        EXPECT_GT(margin(event), 0);
+    }
+}
+
+// A load that swings through zero speed faster than any loss could hold it: one line, not "sticks" and "moves".
+TEST(Explain, AMeshThatOnlyPassesThroughRestIsToldOnce) {
+    Description d;
+    d.name = "gear";
+    d.masses = {mass("a", 1, 1), mass("b", 1, 1)};
+    d.gears = {lossy_gear("g", "a", "b", 1, 0.9, 0)};
+    d.sources = {source("b", constant(-10))};
+    Rig rig(d);
+    const auto lines = told(rig, 0.4);
+    ASSERT_FALSE(lines.empty());
+    EXPECT_NE(lines[0].find(" g passes through rest: rest would need "), std::string::npos) << lines[0];
+    EXPECT_LT(margin(rig.events[0]), 0);
+    EXPECT_TRUE(rig.times(EventKind::mesh_sticks, "g").empty());
+}
+
+TEST(Explain, SmallTorquesAreNotRoundedToNothing) {
+    Description d = driven_to_rest();
+    d.clutches[0] = clutch("C", "fast", "slow", 5e-4, 1.2);
+    d.masses = {mass("fast", 1e-6, 10), mass("slow", 1e-6)};
+    d.sources = {};
+    Rig rig(d);
+    const auto lines = told(rig, 0.2);
+    EXPECT_NE(lines.back().find(" of 0.0006 Nm static"), std::string::npos) << lines.back();
+}
+
+TEST(Explain, ABodyThatMovesStraightOnHasForces) {
+    Description d;
+    d.name = "sledge";
+    d.masses = {{"sledge", 10, Motion::translating, 1}};
+    d.clutches = {clutch("skid", "sledge", "", 50, 1.2)};
+    Rig rig(d);
+    const auto lines = told(rig, 0.5);
+    EXPECT_NE(lines.back().find(", force 0.0 of 60.0 N static"), std::string::npos) << lines.back();
+}
+
+// More brakes than a step can tell of close in the first one.
+TEST(Explain, WhatAStepCannotTellIsCounted) {
+    Description d;
+    d.name = "many";
+    constexpr int brakes = 100;
+    for (int i = 0; i < brakes; ++i) {
+        const std::string name = std::to_string(i);
+        d.masses.push_back(mass("m" + name, 1));
+        d.clutches.push_back(clutch("c" + name, "m" + name, "", 10));
+    }
+    Rig rig(d);
+    rig.step();
+    EXPECT_EQ(rig.outputs.event_count, brakes);
+    ASSERT_EQ(rig.events.size(), 64u);
+    EXPECT_EQ(rig.events.back().kind, EventKind::untold);
+    EXPECT_EQ(rig.events.back().value, brakes - 63);
+    EXPECT_EQ(explain(rig.model, rig.events.back()),
+              "t=0.0000000 model has 37 more changes of state in this step than it can tell");
+}
+
+}  // namespace
+}  // namespace shiftrig::plant
