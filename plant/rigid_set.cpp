@@ -85,6 +85,27 @@ Eigen::MatrixXd motions(const RigidSet& set, const std::vector<double>& inertia)
     return basis;
 }
 
+Eigen::MatrixXd self_stresses(const RigidSet& set, const std::vector<double>& inertia) {
+    const Eigen::Index cols = set.columns.cols();
+    if (cols == 0) return {};
+    const Eigen::MatrixXd scaled = scaled_columns(set, inertia);
+    const auto qr = factor(scaled);
+    const Eigen::Index rank = qr.rank();
+    const Eigen::MatrixXd r = qr.matrixR().topRows(rank).triangularView<Eigen::Upper>();
+    Eigen::MatrixXd parts(cols, cols - rank);
+    parts.topRows(rank) =
+        -r.leftCols(rank).triangularView<Eigen::Upper>().solve(r.rightCols(cols - rank)).eval();
+    parts.bottomRows(cols - rank).setIdentity();
+    parts = qr.colsPermutation() * parts;
+    for (Eigen::Index k = 0; k < cols; ++k) {  // undo the scaling of the columns
+        double square = 0;
+        for (Eigen::Index j = 0; j < scaled.rows(); ++j)
+            square += set.columns(j, k) * set.columns(j, k) / inertia[static_cast<std::size_t>(j)];
+        parts.row(k) /= std::sqrt(square);
+    }
+    return parts;
+}
+
 std::vector<TieUp> tie_ups(const RigidSet& set, const std::vector<double>& inertia) {
     std::vector<TieUp> result;
     if (set.columns.cols() == 0) return result;

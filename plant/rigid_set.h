@@ -38,6 +38,9 @@ RigidSet rigid_set(const Description& description, const Structure& structure,
 // Zero columns: the set locks everything.
 Eigen::MatrixXd motions(const RigidSet& set, const std::vector<double>& inertia);
 
+// All torques of the devices that balance on their own: the columns of the result span {M : CM = 0}. None without loops.
+Eigen::MatrixXd self_stresses(const RigidSet& set, const std::vector<double>& inertia);
+
 // A loop of rigid devices whose rows depend on each other: the split of their torques is not unique.
 struct TieUp {
     std::vector<std::string> devices;

@@ -3,14 +3,18 @@
 //     node j:     T_j + δ_j,out T_out = Σ_k t_jk                  t_jk: torque of node j into device k
 //     device k:   t_jk = Â_jk M_k                                 Â with û = u η^x of every mesh
 //     speeds:     Aᵀω = 0                                         with the given speed(s)
+//     loops:      Nᵀθ = 0, θ_k = M_k/k_k of shafts, else 0        N: torques that balance on their own, A N = 0
 //
-// Known are the torques put in at nodes (masses); the output node absorbs what arrives. The loss exponents x agree
-// with the lossy solution: starting from the ideal one, the wrong mesh with the largest torque is flipped until none
-// is wrong (x = sign(M_1 (ω_1 − ω_carrier)); x = 0 where the mesh does not move).
-// Shafts are taken as untwistable, tyres and wheel contacts as rolling. Not in it: what needs a magnitude of
-// speed or a state (dampers, converters, engine, draft, rolling resistance).
+// Known are the torques put in at nodes (masses); the output node absorbs what arrives, unless closed devices hold it:
+// then they take it. The loss exponents x agree with the lossy solution: starting from the ideal one, the wrong mesh with
+// the largest torque is flipped until none is wrong (x = sign(M_1 (ω_1 − ω_carrier))). Where a mesh does not move x = 0:
+// its loss may be anything up to its limit in either direction, and the torques are those without it.
+// Motions take shafts as untwistable, tyres and wheel contacts as rolling. Loops share by the stiffness of their shafts,
+// untwisted without load and with the play of backlashes taken up; loops of rigid devices by capacity.
+// Not in it: what needs a magnitude of speed or a state (dampers, converters, engine, draft, rolling resistance).
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,8 +36,9 @@ struct StaticsResult {
     struct LinkTorque {
         std::string name;  // "row1.sun", "gear.a", "C1.b"
         std::string device, node;
-        double torque = 0;  // [Nm], positive from the node into the device
-        double speed = 0;   // of the node [rad/s]
+        double torque = 0;         // [Nm] or [N], positive from the node into the device
+        double speed = 0;          // of the node [rad/s] or [m/s]
+        bool translating = false;  // the node
     };
     struct MeshFlow {
         std::string name;
@@ -43,27 +48,35 @@ struct StaticsResult {
     };
     struct Node {
         std::string name;
-        double speed = 0;     // [rad/s]
-        double external = 0;  // torque from outside, the absorbed one included [Nm]
-        double residual = 0;  // of the node balance [Nm]
+        double speed = 0;     // [rad/s] or [m/s]
+        double external = 0;  // torque from outside, the absorbed one included [Nm] or [N]
+        double residual = 0;  // of the node balance [Nm] or [N]
+        bool translating = false;
     };
     std::vector<LinkTorque> links;
     std::vector<MeshFlow> meshes;
     std::vector<Node> nodes;
-    double output_torque =
-        0;             // on the output node [Nm]; −Σ… : negative where the output resists positive input
-    double ratio = 0;  // ω_input / ω_output, 0 where the output stands
-    double power_in = 0;              // positive external powers together [W]
-    double loss = 0;                  // [W]
-    double efficiency = 1;            // 1 − loss/power_in
-    double worst_residual = 0;        // relative to the largest torque
-    bool split_not_unique = false;    // a tie-up: shared by capacity, see tie_up
-    std::vector<std::string> tie_up;  // devices of the loops
-    bool directions_settled = true;   // false: no consistent set of x found (possible below η = 0.5)
+    Node input, output;           // the first input node and the absorbing one
+    double output_torque = 0;     // on the output node [Nm] or [N]; negative where it resists positive input
+    bool output_held = false;     // by closed devices, which take what arrives: output_torque is 0
+    bool output_driven = false;   // self-locking: nobody absorbs, the output has to bring part of the loss
+    bool at_rest = false;         // every node
+    std::optional<double> ratio;  // ω_input / ω_output; none where the output stands
+    double power_in = 0;          // positive external powers together [W]
+    double loss = 0;              // [W]
+    // 1 − loss/power_in; none without power, where the output is driven and where directions are not settled.
+    std::optional<double> efficiency;
+    double worst_residual = 0;                     // relative to the largest torque
+    std::vector<std::string> loss_at_rest;         // lossy meshes that carry torque and do not move
+    std::vector<std::string> shared_by_stiffness;  // devices in loops that the shafts decide
+    bool split_not_unique = false;                 // a tie-up: shared by capacity, see tie_up
+    std::vector<std::string> tie_up;               // devices whose torque mechanics leaves open
+    bool directions_settled = true;  // false: no set of x agrees with its torques, which cannot be
 };
 
-// Throws ModelError where names are wrong, the closed set lets nothing turn, the input torque finds no way to the
-// output, a closed freewheel would have to pull or to carry more than it is rated for, or a speed that a lossy mesh needs does not follow from the given ones.
+// Throws ModelError where a name or number is wrong, a given speed contradicts the closed set, the input torques are not in
+// balance with the losses and nothing holds them (it says what would be), a closed freewheel would have to pull or to carry
+// more than it is rated for, or a speed that a lossy mesh needs does not follow from the given ones.
 StaticsResult solve_statics(const Description& description, const StaticsProblem& problem);
 
 }  // namespace shiftrig::plant

@@ -18,32 +18,97 @@ struct Options {
     bool ideal = false, json = false;
 };
 
+const char* torque_unit(bool translating) {
+    return translating ? "N" : "Nm";
+}
+const char* speed_unit(bool translating) {
+    return translating ? "m/s" : "rad/s";
+}
+// Of input over output.
+const char* ratio_unit(const plant::StaticsResult& result) {
+    if (result.input.translating == result.output.translating) return "1";
+    return result.output.translating ? "rad/m" : "m/rad";
+}
+
 nlohmann::ordered_json as_json(const plant::StaticsResult& result) {
-    nlohmann::ordered_json links = nlohmann::ordered_json::object(), meshes = links, nodes = links;
-    for (const auto& link : result.links) links[link.name] = link.torque;
+    using json = nlohmann::ordered_json;
+    json links = json::object(), link_units = links, meshes = links, nodes = links;
+    for (const auto& link : result.links) {
+        links[link.name] = link.torque;
+        link_units[link.name] = torque_unit(link.translating);
+    }
     for (const auto& mesh : result.meshes)
         meshes[mesh.name] = {{"x", mesh.x}, {"power_w", mesh.power}, {"loss_w", mesh.loss}};
     for (const auto& node : result.nodes)
-        nodes[node.name] = {{"speed", node.speed}, {"external", node.external}, {"residual", node.residual}};
+        nodes[node.name] = {{"speed", node.speed},
+                            {"external", node.external},
+                            {"residual", node.residual},
+                            {"speed_unit", speed_unit(node.translating)},
+                            {"torque_unit", torque_unit(node.translating)}};
+    const auto or_null = [](const std::optional<double>& value) { return value ? json(*value) : json(); };
     return {{"links", links},
+            {"link_units", link_units},
             {"meshes", meshes},
             {"nodes", nodes},
             {"output_torque", result.output_torque},
-            {"ratio", result.ratio},
-            {"efficiency", result.efficiency},
+            {"output_torque_unit", torque_unit(result.output.translating)},
+            {"output_held", result.output_held},
+            {"self_locking", result.output_driven},
+            {"at_rest", result.at_rest},
+            {"ratio", or_null(result.ratio)},
+            {"ratio_unit", ratio_unit(result)},
+            {"efficiency", or_null(result.efficiency)},
             {"power_in_w", result.power_in},
             {"loss_w", result.loss},
+            {"loss_at_rest", result.loss_at_rest},
             {"worst_residual", result.worst_residual},
+            {"shared_by_stiffness", result.shared_by_stiffness},
             {"split_not_unique", result.split_not_unique},
             {"tie_up", result.tie_up},
             {"directions_settled", result.directions_settled}};
 }
 
+std::string words(const std::vector<std::string>& names) {
+    std::string text;
+    for (const auto& name : names) text += (text.empty() ? "" : " ") + name;
+    return text;
+}
+
+void print_summary(const plant::StaticsResult& result, bool ideal) {
+    const char* const unit = torque_unit(result.output.translating);
+    const std::string torque = decimals(result.output_torque, 4) + " " + unit;
+    std::cout << '\n' << (result.output_held ? "output held" : "output torque " + torque);
+    if (result.ratio) {
+        std::cout << ", ratio " << decimals(*result.ratio, 4);
+        if (result.input.translating != result.output.translating) std::cout << ' ' << ratio_unit(result);
+    }
+    if (result.at_rest) std::cout << ", at rest";
+    if (result.efficiency) std::cout << ", efficiency " << decimals(*result.efficiency, 4);
+    std::cout << (ideal ? " (losses left out)" : "") << '\n';
+    if (result.output_driven)
+        std::cout << "self-locking in this direction: the output has to be driven as well, with " << torque
+                  << " (" << decimals(result.output_torque * result.output.speed, 4)
+                  << " W); all that is put in is lost\n";
+    if (!result.loss_at_rest.empty())
+        std::cout << "losses at rest are not determined: " << words(result.loss_at_rest)
+                  << " may take any up to their limit, either way; the torques shown are those without\n";
+    if (!result.shared_by_stiffness.empty())
+        std::cout << "loop: " << words(result.shared_by_stiffness)
+                  << " share by the stiffness of the shafts, untwisted without load\n";
+    if (result.split_not_unique)
+        std::cout << "tie-up: the split between " << words(result.tie_up)
+                  << " is not unique; shared by capacity\n";
+    if (!result.directions_settled)
+        std::cout << "no consistent directions of power were found (self-locking, or an η below 0.5): the "
+                     "torques shown cannot be\n";
+}
+
 void print(const plant::StaticsResult& result, const Options& options) {
     TextTable links;
-    links.row({"link", "node", "torque Nm", "speed rad/s"});
+    links.row({"link", "node", "torque", "", "speed", ""});
     for (const auto& link : result.links)
-        links.row({link.name, link.node, decimals(link.torque, 4), decimals(link.speed, 4)});
+        links.row({link.name, link.node, decimals(link.torque, 4), torque_unit(link.translating),
+                   decimals(link.speed, 4), speed_unit(link.translating)});
     links.print(std::cout, "");
     if (!result.meshes.empty()) {
         std::cout << '\n';
@@ -53,16 +118,7 @@ void print(const plant::StaticsResult& result, const Options& options) {
             meshes.row({mesh.name, std::to_string(mesh.x), decimals(mesh.power, 4), decimals(mesh.loss, 4)});
         meshes.print(std::cout, "");
     }
-    std::cout << "\noutput torque " << decimals(result.output_torque, 4) << " Nm, ratio "
-              << decimals(result.ratio, 4) << ", efficiency " << decimals(result.efficiency, 4)
-              << (options.ideal ? " (losses left out)" : "") << '\n';
-    if (result.split_not_unique) {
-        std::cout << "tie-up: the split between";
-        for (const auto& device : result.tie_up) std::cout << ' ' << device;
-        std::cout << " is not unique; shared by capacity\n";
-    }
-    if (!result.directions_settled)
-        std::cout << "no consistent directions of power were found (an η below 0.5?)\n";
+    print_summary(result, options.ideal);
 }
 
 int run(const Options& options) {
@@ -90,10 +146,20 @@ Command::Run declare_statics(CLI::App& app) {
     auto options = std::make_shared<Options>();
     app.add_option("MODEL", options->model, "model file (YAML)")->required();
     app.add_option("--closed", options->closed, "clutches and brakes that are closed: C1,C3")->delimiter(',');
-    app.add_option("--input", options->inputs, "NODE=TORQUE on a mass, in Nm")->delimiter(',')->required();
-    app.add_option("--speed", options->speeds, "NODE=VALUE in rad/s; otherwise the first input turns at +1")
+    app.add_option(
+           "--input", options->inputs,
+           "NODE=TORQUE on a mass, in Nm (N on a translating one); several: in balance with the losses, "
+           "where nothing holds them")
+        ->delimiter(',')
+        ->required();
+    app.add_option(
+           "--speed", options->speeds,
+           "NODE=VALUE in rad/s (m/s); otherwise the first input turns at +1. 0: at rest, where losses are "
+           "not determined and closed clutches may hold the machine")
         ->delimiter(',');
-    app.add_option("--output", options->output, "the mass that absorbs; otherwise the model's output_mass");
+    app.add_option(
+        "--output", options->output,
+        "the mass that absorbs, unless closed clutches hold it; otherwise the model's output_mass");
     app.add_option("--option", options->options, "GEAR=OPTION to be in use: range=L")->delimiter(',');
     app.add_flag("--ideal", options->ideal, "leave the losses out");
     app.add_flag("--json", options->json, "print one JSON object");

@@ -16,10 +16,11 @@ inline std::string digits(double value, int count = 5) {
     return text;
 }
 
-// A number with so many decimals.
+// A number with so many decimals; one too long for that by its digits.
 inline std::string decimals(double value, int count) {
     char text[40];
-    std::snprintf(text, sizeof text, "%.*f", count, value);
+    if (std::snprintf(text, sizeof text, "%.*f", count, value) >= static_cast<int>(sizeof text))
+        return digits(value, 9);
     const bool minus_zero = text[0] == '-' && std::strspn(text + 1, "0.") == std::strlen(text + 1);
     return minus_zero ? text + 1 : text;
 }

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/apps/program.h"
@@ -129,6 +132,197 @@ TEST(StaticsCommand, WrongNamesAndNumbersAreOneLineAndCodeTwo) {
     EXPECT_EQ(said.exit_code, 2);
     EXPECT_NE(said.err.find("over-determined"), std::string::npos) << said.err;
     EXPECT_EQ(said.out, "");
+}
+
+TEST(StaticsCommand, NumbersThatAreNoneAreOneLineAndCodeTwo) {
+    const std::vector<std::pair<std::string, std::string>> shown{
+        {"nan", "nan"}, {"1e400", "inf"}, {"inf", "inf"}, {"-1e101", "-1e+101"}};
+    for (const auto& [given, value] : shown) {
+        const std::string rule = " \"input\" = " + value + "; must be finite, at most 1e100 in size\n";
+        Said said = statics({wt, "--closed", "C1,C3", "--input", "input=" + given});
+        EXPECT_EQ(said.exit_code, 2) << given;
+        EXPECT_EQ(said.err, "shiftrig: statics \"WT gearbox\": input" + rule);
+        EXPECT_EQ(said.out, "");
+        said = statics({wt, "--closed", "C1,C3", "--input", "input=1", "--speed", "input=" + given});
+        EXPECT_EQ(said.exit_code, 2) << given;
+        EXPECT_EQ(said.err, "shiftrig: statics \"WT gearbox\": speed" + rule);
+        EXPECT_EQ(said.out, "");
+    }
+}
+
+// Gear IV is a direct drive.
+TEST(StaticsCommand, LongNumbersKeepTheirSize) {
+    const Said said = statics({wt, "--closed", "C1,C2", "--input", "input=1e60", "--ideal"});
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    EXPECT_NE(said.out.find("\noutput torque -1e+60 Nm, ratio 1.0000, efficiency 1.0000"), std::string::npos)
+        << said.out;
+}
+
+// A model file that lives as long as its test.
+class ModelFile {
+  public:
+    explicit ModelFile(const std::string& text)
+        : path_(std::filesystem::path(testing::TempDir()) /
+                (std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + ".yaml")) {
+        std::ofstream(path_) << text;
+    }
+    ~ModelFile() { std::filesystem::remove(path_); }
+    ModelFile(const ModelFile&) = delete;
+    ModelFile& operator=(const ModelFile&) = delete;
+    std::string path() const { return path_.string(); }
+
+  private:
+    std::filesystem::path path_;
+};
+
+std::string last_lines(const std::string& text) {
+    return text.substr(text.find("\noutput") + 1);
+}
+
+const char* const row_and_brake = R"(
+name: row
+masses: {sun: {inertia_kg_m2: 1}, ring: {inertia_kg_m2: 1}, carrier: {inertia_kg_m2: 1}}
+planetaries: {row: {sun: sun, ring: ring, carrier: carrier, ratio: RATIO, efficiency: EFFICIENCY}}
+clutches: {B: {a: sun, b: housing, dry: {sliding_capacity_nm: 500, static_ratio: 1}, direct: {initial: 1}}}
+gear_paths: {low: {closed: [B]}}
+input_mass: sun
+output_mass: carrier
+)";
+
+std::string row_with(const std::string& ratio, const std::string& efficiency) {
+    std::string text = row_and_brake;
+    text.replace(text.find("RATIO"), 5, ratio);
+    return text.replace(text.find("EFFICIENCY"), 10, efficiency);
+}
+
+// Ring: 2·0.96·30 = 57.6; carrier: 87.6; loss 16 of 2352 W (statics_test).
+TEST(StaticsCommand, LoadsInBalanceWithTheLossesAreSolvedOthersToldTheBalance) {
+    const ModelFile model(row_with("-2", "0.96"));
+    const std::vector<std::string> speeds{"--speed", "sun=40,ring=20", "--input"};
+    std::vector<std::string> arguments{model.path()};
+    arguments.insert(arguments.end(), speeds.begin(), speeds.end());
+    arguments.push_back("sun=30,ring=57.6");
+    Said said = statics(arguments);
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    EXPECT_EQ(last_lines(said.out), "output torque -87.6000 Nm, ratio 1.5000, efficiency 0.9932\n");
+    arguments.back() = "sun=30,ring=60";
+    said = statics(arguments);
+    EXPECT_EQ(said.exit_code, 2);
+    EXPECT_NE(said.err.find("balance it: sun = 31.25 Nm (30 given) or ring = 57.6 Nm (60 given)\n"),
+              std::string::npos)
+        << said.err;
+}
+
+// 100 W at the ring and 200 W at the carrier are 300 W of loss (statics_test).
+TEST(StaticsCommand, SelfLockingIsSaidAndNoEfficiencyPrinted) {
+    const ModelFile model(row_with("0.99", "0.97"));
+    const std::vector<std::string> arguments{model.path(), "--closed", "B", "--input", "ring=100"};
+    Said said = statics(arguments);
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    EXPECT_EQ(
+        last_lines(said.out),
+        "output torque -2.0202 Nm, ratio -0.0101\n"
+        "self-locking in this direction: the output has to be driven as well, with -2.0202 Nm (200.0000 W); "
+        "all that is put in is lost\n");
+    auto as_json = arguments;
+    as_json.push_back("--json");
+    said = statics(as_json);
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    const auto answer = nlohmann::json::parse(said.out);
+    EXPECT_TRUE(answer.at("self_locking").get<bool>());
+    EXPECT_TRUE(answer.at("efficiency").is_null());
+    EXPECT_NEAR(answer.at("loss_w").get<double>(), 300, 1e-9);
+}
+
+TEST(StaticsCommand, AtRestNoEfficiencyIsPrintedAndLossesAreSaidToBeOpen) {
+    const std::vector<std::string> arguments{wt,        "--closed", "C1,C3",  "--input",
+                                             "input=1", "--speed",  "input=0"};
+    Said said = statics(arguments);
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    EXPECT_EQ(
+        last_lines(said.out),
+        "output torque -1.5230 Nm, at rest\n"
+        "losses at rest are not determined: row1 row2 row3 may take any up to their limit, either way; the "
+        "torques shown are those without\n");
+    auto as_json = arguments;
+    as_json.push_back("--json");
+    const auto answer = nlohmann::json::parse(statics(as_json).out);
+    EXPECT_TRUE(answer.at("at_rest").get<bool>());
+    EXPECT_TRUE(answer.at("efficiency").is_null());
+    EXPECT_TRUE(answer.at("ratio").is_null());
+    EXPECT_EQ(answer.at("loss_at_rest"), nlohmann::json({"row1", "row2", "row3"}));
+}
+
+TEST(StaticsCommand, HeldMachineIsSolvedAtRest) {
+    // Sun and carrier held, 30 on the ring: M = 30/2, and the brakes hold 15 and 45.
+    const std::string text = row_with("-2", "0.96");
+    const std::string brake = "clutches: {B: ",
+                      second =
+                          "clutches: {D: {a: carrier, b: housing, dry: {sliding_capacity_nm: "
+                          "500, static_ratio: 1}, direct: {initial: 1}}, B: ";
+    const ModelFile model(std::string(text).replace(text.find(brake), brake.size(), second));
+    std::vector<std::string> arguments{model.path(), "--closed", "B,D",   "--input",
+                                       "ring=30",    "--speed",  "ring=0"};
+    const Said said = statics(arguments);
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    EXPECT_EQ(last_lines(said.out),
+              "output held, at rest\n"
+              "losses at rest are not determined: row may take any up to their limit, either way; the "
+              "torques shown "
+              "are those without\n");
+    arguments.push_back("--json");
+    const auto links = nlohmann::json::parse(statics(arguments).out).at("links");
+    EXPECT_NEAR(links.at("B.a").get<double>(), -15, 1e-12);
+    EXPECT_NEAR(links.at("D.a").get<double>(), 45, 1e-12);
+    arguments.resize(5);
+    EXPECT_EQ(
+        statics(arguments).err,
+        "shiftrig: statics \"row\": closed = B,D locks node \"ring\": over-determined, it cannot turn; speed "
+        "ring = 0 asks for the torques at rest\n");
+}
+
+// 70674.47 Nm at the wheels are 75587.67 N at their rolling radius of 0.935 m.
+TEST(StaticsCommand, TranslatingNodesAreInNewtonsAndMetresPerSecond) {
+    const std::string tractor = SHIFTRIG_SOURCE_DIR "/config/tractor.yaml";
+    std::vector<std::string> arguments{tractor,       "--closed", "Fc,F2",  "--input",
+                                       "engine=1000", "--output", "vehicle"};
+    const Said said = statics(arguments);
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    EXPECT_NE(said.out.find("tyre.a                wheels   70674.4723  Nm   0.0126  rad/s\n"),
+              std::string::npos)
+        << said.out;
+    EXPECT_NE(said.out.find("tyre.b               vehicle  -75587.6709   N   0.0118    m/s\n"),
+              std::string::npos)
+        << said.out;
+    EXPECT_EQ(last_lines(said.out), "output torque -75587.6709 N, ratio 84.8303 rad/m, efficiency 0.8910\n");
+    arguments.push_back("--json");
+    const auto answer = nlohmann::json::parse(statics(arguments).out);
+    EXPECT_EQ(answer.at("link_units").at("tyre.a"), "Nm");
+    EXPECT_EQ(answer.at("link_units").at("tyre.b"), "N");
+    EXPECT_EQ(answer.at("nodes").at("vehicle").at("speed_unit"), "m/s");
+    EXPECT_EQ(answer.at("nodes").at("wheels").at("torque_unit"), "Nm");
+    EXPECT_EQ(answer.at("output_torque_unit"), "N");
+    EXPECT_EQ(answer.at("ratio_unit"), "rad/m");
+}
+
+// Two shafts side by side, 2000 and 3000: 30 is 12 and 18.
+TEST(StaticsCommand, LoopOfShaftsIsSharedByStiffness) {
+    const ModelFile model(R"(
+name: loop
+masses: {A: {inertia_kg_m2: 1}, B: {inertia_kg_m2: 1}}
+shafts:
+  s1: {a: A, b: B, stiffness_nm_per_rad: 2000, damping_nm_s_per_rad: 1}
+  s2: {a: A, b: B, stiffness_nm_per_rad: 3000, damping_nm_s_per_rad: 1}
+input_mass: A
+output_mass: B
+)");
+    const Said said = statics({model.path(), "--input", "A=30"});
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    EXPECT_NE(said.out.find("s1.a     A   12.0000  Nm"), std::string::npos) << said.out;
+    EXPECT_NE(said.out.find("s2.a     A   18.0000  Nm"), std::string::npos) << said.out;
+    EXPECT_EQ(last_lines(said.out),
+              "output torque -30.0000 Nm, ratio 1.0000, efficiency 1.0000\n"
+              "loop: s1 s2 share by the stiffness of the shafts, untwisted without load\n");
 }
 
 }  // namespace
