@@ -273,6 +273,19 @@ engines:
                    "all open: engine order 2 meets the mode at 59.6 Hz at 1787 rpm (damping ratio 0.00)"}));
 }
 
+TEST(CheckCommand, WhatStepsDoNotResolveDependsOnTheRate) {
+    const std::string text = R"(name: stiff and light
+masses: {a: {inertia_kg_m2: 1}, t: {inertia_kg_m2: 1.0e-5}, b: {inertia_kg_m2: 1}}
+shafts:
+  s: &shaft {a: a, b: t, stiffness_nm_per_rad: 30000, damping_nm_s_per_rad: 0.001}
+  r: {<<: *shaft, a: t, b: b}
+clutches: {K: {a: t, b: housing, dry: {sliding_capacity_nm: 1, static_ratio: 1.2}, direct: {}}}
+)";
+    EXPECT_EQ(checked_text(text).at("warnings").size(), 1u);
+    EXPECT_EQ(checked_text(text, {"--rate-hz", "2500"}).at("warnings").size(), 0u);
+    EXPECT_EQ(check({config + "tractor.yaml", "--rate-hz", "0"}).exit_code, 2);
+}
+
 // ---- what is wrong ---------------------------------------------------------------------------------------
 
 TEST(CheckCommand, AWrongModelIsOneLineAndCodeTwo) {

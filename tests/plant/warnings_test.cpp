@@ -1,4 +1,5 @@
-// What `check` warns about: each warning word for word, where it is due and where it is not.
+// What `check` warns about: each warning word for word, where it is due and where it is not; and that the step does go wrong
+// where it is said to, and does not where the advice is taken.
 #include "plant/warnings.h"
 
 #include <gtest/gtest.h>
@@ -224,6 +225,104 @@ TEST(Warnings, NameFrictionThatIsTooSteep) {
         Lines{"clutch \"F\": its friction rises by 200 Nm s/rad and so slows its lighter mass within 0.5 µs; "
               "a step of 1 ms resolves no less than 3.91 µs"});
     EXPECT_EQ(warnings_of(d, 1e-4), Lines{});
+}
+
+TEST(Warnings, NameForcesThatAnswerSpeedTooFast) {
+    Description d = engine_on_a_shaft();
+    d.shafts.clear();
+    EXPECT_EQ(warnings_of(d), Lines{});
+    d.masses[0].inertia = 1e-3;
+    EXPECT_EQ(warnings_of(d),
+              Lines{"engine \"engine\": its governor corrects the speed within 10 µs; a step of 1 ms "
+                    "resolves no less than 62.5 µs"});
+    d.engines[0].actuator_lag = 1e-2;  // swings at 3162 rad/s
+    EXPECT_EQ(warnings_of(d), Lines{});
+    d.engines[0].actuator_lag = 1e-5;
+    EXPECT_EQ(warnings_of(d).size(), 2u);
+    d.engines.clear();
+    TorqueSource drag;
+    drag.name = "fan", drag.mass = "engine", drag.quadratic = 0.1;
+    d.sources = {drag};
+    EXPECT_EQ(warnings_of(d), Lines{"source \"fan\": its drag above 80 rad/s slows mass \"engine\" faster "
+                                    "than a step of 1 ms resolves"});
+    EXPECT_EQ(warnings_of(d, 5e-5), Lines{});
+}
+
+TEST(Warnings, NameATyreOnAWheelThatIsTooLight) {
+    Description d;
+    d.masses = {mass("wheel", 0.0642), mass("body", 3000, Motion::translating)};
+    BrixiusTyre tyre;
+    tyre.name = "tyre", tyre.wheel = "wheel", tyre.body = "body";
+    tyre.radius = 0.5;
+    tyre.mobility_number = 55;
+    tyre.relaxation_length = 0.3;
+    tyre.weight = 30000;
+    tyre.slip_damping_time = 0.05;
+    d.tyres = {tyre};
+    EXPECT_EQ(warnings_of(d),
+              Lines{"tyre \"tyre\": its force answers the slip of its wheel within 7.81 µs; a step of "
+                    "1 ms resolves no less than 62.5 µs"});
+    d.masses[0].inertia = 10;
+    EXPECT_EQ(warnings_of(d), Lines{});
+}
+
+// 1 | 1e-5 | 1 kg m² between shafts, a brake on the light one: it swings at 12.3 kHz.
+Description light_mass_with_brake(double damping = 1e-3, int parts = 16) {
+    Description d;
+    d.masses = {mass("a", 1), mass("t", 1e-5), mass("b", 1)};
+    d.shafts = {shaft("s", "a", "t", 30000, damping), shaft("r", "t", "b", 30000, damping)};
+    d.clutches = {machines::clutch("K", "t", "", 1, 1.2)};
+    d.gear_paths = {{"g", {}}, {"h", {"K"}}};
+    TorqueSource source;
+    source.name = "q", source.mass = "t", source.waveform.pieces = {{.amplitude = 5, .frequency = 30}};
+    d.sources = {source};
+    d.maximum_parts = parts;
+    return d;
+}
+
+TEST(Warnings, NameAModeThatTurnsFrictionRoundFasterThanTheStepResolves) {
+    EXPECT_EQ(warnings_of(light_mass_with_brake()),
+              Lines{"gear g, all open: mode at 12328 Hz of \"t\" (ωh = 77.5, damping ratio 0.0013): a step "
+                    "of 1 ms (its shortest "
+                    "part: 62.5 µs) does not resolve how it turns the friction of \"K\" round; take steps of "
+                    "0.413 ms or "
+                    "maximum_parts 64, damp it, or make the mass part of its neighbour"});
+    EXPECT_EQ(warnings_of(light_mass_with_brake(), 0.41e-3), Lines{});
+    EXPECT_EQ(warnings_of(light_mass_with_brake(1e-3, 64)), Lines{});
+    EXPECT_EQ(warnings_of(light_mass_with_brake(1)), Lines{});
+    Description d = light_mass_with_brake();
+    d.masses[1].inertia = 1e-3;
+    EXPECT_EQ(warnings_of(d), Lines{});
+    d.method = Method::ark3;  // whose shafts are not exact
+    EXPECT_EQ(warnings_of(d).size(), 1u);
+    d = light_mass_with_brake();
+    d.clutches[0].a = "a";  // which the mode hardly moves
+    EXPECT_EQ(warnings_of(d), Lines{});
+}
+
+// Largest difference of the light mass's speed from a run at 20 µs, of the range of that.
+double error_of(const Description& d, double step_size) {
+    BuildOptions fine, coarse;
+    fine.step_size = 2e-5;
+    coarse.step_size = step_size;
+    Rig reference(d, fine), rig(d, coarse);
+    double low = 0, high = 0, worst = 0;
+    while (rig.state.time() < 0.25 - 1e-9) {
+        rig.step();
+        reference.run(rig.state.time());
+        const double speed = reference.out("mass.t.speed");
+        low = std::min(low, speed);
+        high = std::max(high, speed);
+        worst = std::max(worst, std::fabs(rig.out("mass.t.speed") - speed));
+    }
+    return worst / (high - low);
+}
+
+TEST(Warnings, AreTrueOfTheModeThatTurnsFrictionRoundAndSoIsTheirAdvice) {
+    EXPECT_GT(error_of(light_mass_with_brake(), 1e-3), 0.2);
+    EXPECT_LT(error_of(light_mass_with_brake(), 0.4e-3), 0.01);
+    EXPECT_LT(error_of(light_mass_with_brake(1e-3, 64), 1e-3), 0.01);
+    EXPECT_LT(error_of(light_mass_with_brake(1), 1e-3), 0.01);
 }
 
 }  // namespace
