@@ -332,6 +332,8 @@ void fields(Fields& f, plant::Engine& e) {
     f.number("fade_from_rpm", e.fade_from, not_negative, "below it the full-load curve falls linearly …");
     f.number("fade_to_rpm", e.fade_to, not_negative, "… to nothing here");
     f.number("stall_speed_rpm", e.stall_speed, not_negative, "below it the engine has stalled");
+    f.optional_integer("cylinders", e.cylinders, at_least_one,
+                       "of four strokes: `check` warns where the order cylinders/2 meets a mode [6]");
 }
 
 template <class Fields>

@@ -3,9 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
-#include "plant/laws/friction.h"
 #include "plant/laws/tyre.h"
 #include "plant/structure.h"
 
@@ -51,6 +49,35 @@ void find_ratio(GearVariant& gear) {
         if (d.masses[j].motion != Motion::translating) continue;
         const auto travel = follows(basis, s.inertia, input, static_cast<int>(j));
         if (travel && std::fabs(*travel) > 1e-12) gear.metres_per_radian = travel;
+    }
+}
+
+// The state with every combination of options: "F2/L", "F2/M", …
+void add_combinations(const Description& description, const std::string& name,
+                      const std::vector<std::string>& closed, std::vector<GearVariant>& variants) {
+    GearVariant first;
+    first.name = name;
+    first.closed = closed;
+    first.description = description;
+    std::vector<GearVariant> combinations{first};
+    for (std::size_t g = 0; g < description.gears.size(); ++g) {
+        const Gear& gear = description.gears[g];
+        if (gear.options.empty()) continue;
+        std::vector<GearVariant> extended;
+        for (const GearVariant& base : combinations) {
+            for (const auto& [option, ratio] : gear.options) {
+                GearVariant variant = base;
+                variant.name += "/" + option;
+                variant.options.emplace_back(gear.name, option);
+                variant.description.gears[g].ratio = ratio;
+                extended.push_back(std::move(variant));
+            }
+        }
+        combinations = std::move(extended);
+    }
+    for (GearVariant& variant : combinations) {
+        find_ratio(variant);
+        variants.push_back(std::move(variant));
     }
 }
 
@@ -152,57 +179,6 @@ Mode make_mode(const Eigen::VectorXd& shape, double square, const Eigen::MatrixX
     return mode;
 }
 
-std::string number(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3g", value);
-    return text;
-}
-
-void warn_of_resonances(const Description& d, const GearVariant& gear, std::vector<std::string>& warnings) {
-    constexpr double order = 3;  // ignitions per revolution of a four-stroke six-cylinder engine
-    const ModalResult modal = natural_modes(gear.description, gear.closed);
-    const Structure s = build_structure(gear.description);
-    for (const Engine& engine : d.engines) {
-        const auto mass = static_cast<std::size_t>(s.mass(engine.mass));
-        for (const Mode& mode : modal.modes) {
-            const double speed = mode.frequency * 2 * pi / order;
-            const bool damped_away = mode.damping_ratio > 0.5;
-            if (speed < engine.low_idle || speed > engine.high_idle || mode.kinetic_share[mass] < 1e-3 ||
-                damped_away)
-                continue;
-            char text[200];
-            std::snprintf(
-                text, sizeof text,
-                "gear %s: engine order 3 meets the mode at %.1f Hz at %.0f rpm (damping ratio %.2f)",
-                gear.name.c_str(), mode.frequency, speed * 30 / pi, mode.damping_ratio);
-            warnings.emplace_back(text);
-        }
-    }
-}
-
-// Friction that rises over the slip damps light masses; a step is divided into 256 parts at most for it.
-void warn_of_steep_friction(const Description& d, std::vector<std::string>& warnings) {
-    constexpr double shortest = 4e-6;  // 1/256 of a step of 1 ms [s]
-    const auto mobility = [&d](const std::string& name) {
-        for (const Mass& mass : d.masses) {
-            if (mass.name == name) return 1 / mass.inertia;
-        }
-        return 0.;  // the housing
-    };
-    for (const Clutch& clutch : d.clutches) {
-        const auto* dry = std::get_if<DryFriction>(&clutch.friction);
-        if (!dry) continue;
-        const FrictionLaw law = friction_law(*dry);
-        const double slope = load_from_engagement(law, 1) * steepest_rise(law);
-        const double radius = clutch.radius > 0 ? clutch.radius : 1;
-        const double time = 1 / (slope * (mobility(clutch.a) + mobility(clutch.b) / (radius * radius)));
-        if (time >= shortest) continue;
-        warnings.push_back("clutch \"" + clutch.name + "\": its friction rises by " + number(slope) +
-                           " Nm s/rad and so slows its lighter mass within " + number(1e6 * time) +
-                           " µs; a step of 1 ms resolves no less than 4 µs");
-    }
-}
-
 }  // namespace
 
 double GearVariant::kmh(double input_rpm) const noexcept {
@@ -211,38 +187,33 @@ double GearVariant::kmh(double input_rpm) const noexcept {
 
 std::vector<GearVariant> gear_variants(const Description& description) {
     std::vector<GearVariant> variants;
-    for (const GearPath& path : description.gear_paths) {
-        GearVariant first;
-        first.name = path.name;
-        first.closed = path.closed;
-        first.description = description;
-        std::vector<GearVariant> combinations{first};
-        for (std::size_t g = 0; g < description.gears.size(); ++g) {
-            const Gear& gear = description.gears[g];
-            if (gear.options.empty()) continue;
-            std::vector<GearVariant> extended;
-            for (const GearVariant& base : combinations) {
-                for (const auto& [option, ratio] : gear.options) {
-                    GearVariant variant = base;
-                    variant.name += "/" + option;
-                    variant.options.emplace_back(gear.name, option);
-                    variant.description.gears[g].ratio = ratio;
-                    extended.push_back(std::move(variant));
-                }
-            }
-            combinations = std::move(extended);
-        }
-        for (GearVariant& variant : combinations) {
-            find_ratio(variant);
-            variants.push_back(std::move(variant));
-        }
-    }
+    for (const GearPath& path : description.gear_paths)
+        add_combinations(description, path.name, path.closed, variants);
     return variants;
 }
 
-ModalResult natural_modes(const Description& d, const std::vector<std::string>& closed,
-                          const ModalOptions& options) {
-    const Structure s = build_structure(d);
+std::vector<GearVariant> other_states(const Description& description) {
+    std::vector<GearVariant> states;
+    if (!description.gear_paths.empty()) {
+        GearVariant open;
+        open.name = "all open";
+        open.description = description;
+        return {open};
+    }
+    std::vector<std::string> start, all;
+    for (const FrictionPair& pair : build_structure(description).pairs) {
+        if (pair.rolling_contact || !can_be_closed(pair)) continue;
+        all.push_back(pair.name);
+        if (pair.initially_locked) start.push_back(pair.name);
+    }
+    if (!start.empty() && start != all) add_combinations(description, "as it starts", start, states);
+    if (!all.empty()) add_combinations(description, "all closed", all, states);
+    add_combinations(description, "all open", {}, states);
+    return states;
+}
+
+Eigen::MatrixXd swinging_motions(const Description& d, const Structure& s,
+                                 const std::vector<std::string>& closed) {
     RigidOptions rigid;
     rigid.stiff_shafts = false;
     rigid.rolling_tyres = false;
@@ -250,7 +221,13 @@ ModalResult natural_modes(const Description& d, const std::vector<std::string>& 
     for (const Clutch& clutch : d.clutches) {
         if (clutch.radius > 0) locked.push_back(clutch.name);
     }
-    const Eigen::MatrixXd basis = motions(rigid_set(d, s, locked, rigid), s.inertia);
+    return motions(rigid_set(d, s, locked, rigid), s.inertia);
+}
+
+ModalResult natural_modes(const Description& d, const std::vector<std::string>& closed,
+                          const ModalOptions& options) {
+    const Structure s = build_structure(d);
+    const Eigen::MatrixXd basis = swinging_motions(d, s, closed);
     const std::vector<Spring> springs = springs_of(d, s, options);
     const Eigen::MatrixXd a = columns_of(springs, s.masses());
     const Eigen::MatrixXd g = a.transpose() * basis;
@@ -272,48 +249,6 @@ ModalResult natural_modes(const Description& d, const std::vector<std::string>& 
     }
     result.damped = damped_modes(g, springs);
     return result;
-}
-
-std::vector<std::string> model_warnings(const Description& d) {
-    std::vector<std::string> warnings;
-    const auto efficiency = [&](const std::string& kind, const std::string& name, double value) {
-        if (value < 0.5) {
-            warnings.push_back(
-                kind + " \"" + name + "\": efficiency " + number(value) +
-                " is below 0.5: it holds itself when driven backwards, and loss directions of several "
-                "such meshes need not be unique");
-        }
-    };
-    for (const Gear& gear : d.gears) {
-        efficiency("gear", gear.name, gear.efficiency);
-        if (gear.backward_efficiency > 0) efficiency("gear", gear.name, gear.backward_efficiency);
-    }
-    for (const Planetary& row : d.planetaries) efficiency("planetary row", row.name, row.efficiency);
-
-    const auto smaller = [](const Mass& a, const Mass& b) { return a.inertia < b.inertia; };
-    std::vector<Mass> rotating;
-    for (const Mass& mass : d.masses) {
-        if (mass.motion == Motion::rotating) rotating.push_back(mass);
-    }
-    if (!rotating.empty()) {
-        const auto [low, high] = std::minmax_element(rotating.begin(), rotating.end(), smaller);
-        if (high->inertia > 1e7 * low->inertia) {
-            warnings.push_back("masses \"" + low->name + "\" and \"" + high->name + "\": inertia ratio " +
-                               number(high->inertia / low->inertia) +
-                               " is beyond 1e7: joins and internal torques lose digits");
-        }
-    }
-    warn_of_steep_friction(d, warnings);
-    for (const GearVariant& gear : gear_variants(d)) {
-        for (const TieUp& tie : gear.tie_ups) {
-            std::string names;
-            for (const std::string& name : tie.devices) names += (names.empty() ? "" : ", ") + name;
-            warnings.push_back("gear " + gear.name + ": the loop of " + names +
-                               " is closed twice: the split of torque is not unique");
-        }
-        warn_of_resonances(d, gear, warnings);
-    }
-    return warnings;
 }
 
 }  // namespace shiftrig::plant

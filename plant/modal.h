@@ -11,6 +11,7 @@
 // Linear in small motion: flanks of shafts with play closed, no friction, loss-free meshes, converters and engines without stiffness.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <utility>
@@ -39,6 +40,10 @@ struct GearVariant {
 // Every gear path times every combination of options; throws ModelError where a path names no clutch or brake.
 std::vector<GearVariant> gear_variants(const Description& description);
 
+// The other states that are looked at: "all open"; of a machine without gear paths also "as it starts" (what is initially
+// locked) and "all closed", each with every combination of options.
+std::vector<GearVariant> other_states(const Description& description);
+
 // ---- natural frequencies ----------------------------------------------------------------------------
 
 struct Mode {
@@ -66,13 +71,11 @@ struct ModalOptions {
     bool closed_flanks = true;  // shafts with play press; false: their play is open
 };
 
+// The motions, J-orthonormal, in which shafts and tyres may twist while gears, closed pairs and wheel contacts hold.
+Eigen::MatrixXd swinging_motions(const Description& description, const Structure& structure,
+                                 const std::vector<std::string>& closed);
+
 ModalResult natural_modes(const Description& description, const std::vector<std::string>& closed,
                           const ModalOptions& options = {});
-
-// ---- warnings ---------------------------------------------------------------------------------------
-
-// What a careful engineer would like to hear about his model, one sentence each: efficiencies below 0.5 (loss directions
-// need not be unique), inertia ratios beyond 1e7, friction too steep for a step of 1 ms, modes that the engine's third order meets between idle and high idle.
-std::vector<std::string> model_warnings(const Description& description);
 
 }  // namespace shiftrig::plant

@@ -26,11 +26,11 @@ Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(const Eigen::MatrixXd& scaled
     return qr;
 }
 
-bool can_be_closed(const FrictionPair& pair) {
+}  // namespace
+
+bool can_be_closed(const FrictionPair& pair) noexcept {
     return pair.kind == PairKind::clutch || pair.kind == PairKind::self_acting;
 }
-
-}  // namespace
 
 RigidSet rigid_set(const Description& d, const Structure& s, const std::vector<std::string>& closed,
                    const RigidOptions& options) {

@@ -30,6 +30,9 @@ struct RigidSet {
     Eigen::MatrixXd columns;  // masses × members, kinematic (A, with u)
 };
 
+// A clutch, brake or freewheel: not what resists motion by itself.
+bool can_be_closed(const FrictionPair& pair) noexcept;
+
 // Throws ModelError where `closed` names no clutch, brake or freewheel.
 RigidSet rigid_set(const Description& description, const Structure& structure,
                    const std::vector<std::string>& closed, const RigidOptions& options = {});

@@ -16,6 +16,7 @@ namespace {
 struct Options {
     std::string model, schema, dot, svg;
     bool json = false, shapes = false;
+    double rate_hz = 1000;
 };
 
 void write(const std::string& path, const std::string& text) {
@@ -30,7 +31,7 @@ int run(const Options& options) {
     }
     if (options.model.empty()) throw CLI::RequiredError("MODEL");
     const io::ModelFile file = io::read_model(options.model);
-    const Examination examination = examine(file);
+    const Examination examination = examine(file, 1 / options.rate_hz);
     if (!options.dot.empty()) write(options.dot, analysis::driveline_dot(file.description));
     if (!options.svg.empty()) write(options.svg, analysis::driveline_svg(file.description, true));
     if (options.json)
@@ -42,9 +43,15 @@ int run(const Options& options) {
 
 Command::Run declare_check(CLI::App& app) {
     auto options = std::make_shared<Options>();
-    app.add_option("MODEL", options->model, "model file (YAML)");
+    app.add_option(
+        "MODEL", options->model,
+        "model file (YAML); warned of are efficiencies below 0.5, rigid parts and initial speeds that "
+        "contradict one another, what a step cannot resolve, and modes that an engine's main order meets");
     app.add_flag("--json", options->json, "print one JSON object");
-    app.add_flag("--shapes", options->shapes, "print the mode shapes of every gear");
+    app.add_flag("--shapes", options->shapes, "print the mode shapes of every gear and state");
+    app.add_option("--rate-hz", options->rate_hz, "of the run to be: warn of what its steps cannot resolve")
+        ->check(CLI::Range(1., 1e5))
+        ->capture_default_str();
     app.add_option("--dot", options->dot, "write the driveline as Graphviz text into this file");
     app.add_option("--svg", options->svg, "draw the driveline and its gear table into this file");
     app.add_option("--schema", options->schema, "print the JSON Schema of model or scenario files")
@@ -52,7 +59,8 @@ Command::Run declare_check(CLI::App& app) {
     return [options] { return run(*options); };
 }
 
-const Command check("check", "masses, distribution matrix, gear table, natural frequencies, tie-ups",
+const Command check("check",
+                    "masses, distribution matrix, gear table, natural frequencies, tie-ups, warnings",
                     declare_check);
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "apps/shiftrig/text_table.h"
 #include "plant/rigid_set.h"
 #include "plant/structure.h"
+#include "plant/warnings.h"
 
 namespace shiftrig::cli {
 
@@ -93,7 +94,7 @@ void print_gears(std::ostream& out, const Examination& examination) {
     out << "\nnatural frequencies, undamped, Hz\n";
     TextTable table;
     for (const auto& [variant, modal] : examination.gears) table.row({variant.name + "  " + listed(modal)});
-    table.row({"all open  " + listed(examination.open)});
+    for (const auto& [state, modal] : examination.states) table.row({state.name + "  " + listed(modal)});
     table.print(out);
 }
 
@@ -173,11 +174,14 @@ void print_tie_ups(std::ostream& out, const Examination& examination) {
 
 }  // namespace
 
-Examination examine(const io::ModelFile& file) {
+Examination examine(const io::ModelFile& file, double step_size) {
     try {
         Examination result;
         result.machine = file.description;
-        const plant::Model model = io::build_model(file);  // everything that can be wrong comes out here
+        plant::BuildOptions build;
+        build.step_size = step_size;
+        const plant::Model model =
+            io::build_model(file, build);  // everything that can be wrong comes out here
         result.engine = model.engine();
         result.engine_reason = model.engine_reason();
         const plant::Structure structure = plant::build_structure(file.description);
@@ -194,8 +198,12 @@ Examination examine(const io::ModelFile& file) {
             result.gears.push_back({std::move(variant), std::move(modal)});
         }
         result.open = plant::natural_modes(file.description, {});
+        for (auto& state : plant::other_states(file.description)) {
+            auto modal = plant::natural_modes(state.description, state.closed);
+            result.states.push_back({std::move(state), std::move(modal)});
+        }
         result.tie_ups = find_tie_ups(file.description, structure);
-        result.warnings = plant::model_warnings(file.description);
+        result.warnings = plant::model_warnings(model);
         return result;
     } catch (const plant::ModelError& error) {
         throw io::located(file, error);
@@ -203,8 +211,8 @@ Examination examine(const io::ModelFile& file) {
 }
 
 nlohmann::ordered_json as_json(const Examination& examination) {
-    json masses = json::array(), matrix = json::array(), gears = json::array(), modes = json::object(),
-         tie_ups = json::array();
+    json masses = json::array(), matrix = json::array(), gears = json::array(), states = json::array(),
+         modes = json::object(), tie_ups = json::array();
     for (const auto& mass : examination.machine.masses) {
         const bool rotating = mass.motion == plant::Motion::rotating;
         masses.push_back({{"name", mass.name}, {rotating ? "inertia_kg_m2" : "mass_kg", mass.inertia}});
@@ -229,6 +237,10 @@ nlohmann::ordered_json as_json(const Examination& examination) {
                            {"with", tie_up.with.empty() ? json() : json(tie_up.with)},
                            {"blocks", tie_up.blocks},
                            {"loop", tie_up.loop}});
+    for (const auto& [state, modal] : examination.states) {
+        states.push_back({{"name", state.name}, {"closed", state.closed}, {"modes_hz", frequencies(modal)}});
+        modes[state.name] = modes_as_json(examination, modal);
+    }
     modes["open"] = modes_as_json(examination, examination.open);
     return {{"name", examination.machine.name},
             {"engine", examination.engine},
@@ -238,6 +250,7 @@ nlohmann::ordered_json as_json(const Examination& examination) {
              {{"masses", examination.masses}, {"devices", examination.devices}, {"values", matrix}}},
             {"gears", gears},
             {"open", {{"modes_hz", frequencies(examination.open)}}},
+            {"states", states},
             {"modes", modes},
             {"tie_ups", tie_ups},
             {"warnings", examination.warnings}};
@@ -253,7 +266,8 @@ void print(std::ostream& out, const Examination& examination, bool with_shapes) 
     if (with_shapes) {
         for (const auto& [variant, modal] : examination.gears)
             print_shapes(out, examination, variant.name, modal);
-        print_shapes(out, examination, "all open", examination.open);
+        for (const auto& [state, modal] : examination.states)
+            print_shapes(out, examination, state.name, modal);
     }
     print_tie_ups(out, examination);
     if (!examination.warnings.empty()) out << "\nwarnings\n";

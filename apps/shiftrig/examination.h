@@ -29,13 +29,14 @@ struct Examination {
     std::vector<std::string> masses, devices;  // rows and columns of the distribution matrix
     Eigen::MatrixXd distribution;              // [Algin] SDM: one column per device
     std::vector<Gear> gears;
-    plant::ModalResult open;  // every clutch and brake open
+    plant::ModalResult open;   // every clutch and brake open
+    std::vector<Gear> states;  // others that are looked at, the open one among them
     std::vector<TieUp> tie_ups;
     std::vector<std::string> warnings;
 };
 
-// Throws io::InputError.
-Examination examine(const io::ModelFile& file);
+// For steps of this size [s]. Throws io::InputError.
+Examination examine(const io::ModelFile& file, double step_size);
 
 nlohmann::ordered_json as_json(const Examination& examination);
 void print(std::ostream& out, const Examination& examination, bool with_shapes);

@@ -23,6 +23,7 @@
 #include "io/recording/event_json.h"
 #include "io/recording/reader.h"
 #include "io/recording/snapshot.h"
+#include "plant/warnings.h"
 #include "rt/machine.h"
 
 namespace shiftrig::cli {
@@ -50,6 +51,16 @@ std::unique_ptr<rig::Rig> make_rig(const RunOptions& options) {
     auto rig = std::make_unique<rig::Rig>(rig::setup_of(snapshot));
     rig::resume(*rig, snapshot);
     return rig;
+}
+
+// What the model file says of its start, where that counts: a scenario and a snapshot may have brought their own.
+void warn_of_initial_speeds(const RunOptions& options, const rig::Rig& rig) {
+    const auto& scenario = rig.setup().scenario;
+    const bool own_start = !options.from.empty() ||
+                           (scenario && !(scenario->start.locked.empty() && scenario->start.speeds.empty()));
+    if (own_start) return;
+    const std::string warning = plant::initial_speed_warning(rig.model());
+    if (!warning.empty()) std::cerr << warning << '\n';
 }
 
 // SIGINT and SIGTERM end the run as if its time were over.
@@ -201,6 +212,7 @@ int run(const RunOptions& options) {
     const auto owned = make_rig(options);
     rig::Rig& rig = *owned;
     for (const auto& warning : rig.buses().warnings()) std::cerr << warning << '\n';
+    warn_of_initial_speeds(options, rig);
 
     rehearse(options, rig);
     rt::AwakeProcessors awake;

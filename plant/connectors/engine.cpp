@@ -25,6 +25,7 @@ void check_parameters(const Check& check, const Engine& e) {
     check.not_negative("fade_to", e.fade_to);
     check.not_negative("fade_from", e.fade_from);
     check.not_negative("stall_speed", e.stall_speed);
+    if (e.cylinders < 1) check.fail("cylinders", "= " + std::to_string(e.cylinders) + "; must be >= 1");
 }
 
 void assemble(Assembly& assembly, const Engine& e) {

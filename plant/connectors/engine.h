@@ -22,6 +22,7 @@ struct Engine {
     double turbo_instant_fraction = 1, turbo_lag = 0;      // [1], [s]
     double fade_from = 0, fade_to = 0;  // below fade_from the curve falls linearly to 0 at fade_to [rad/s]
     double stall_speed = 0;             // below it the engine has stalled until `engine.<name>.start` [rad/s]
+    int cylinders = 6;  // of four strokes: its main order is cylinders/2 (warnings.h alone asks)
 };
 
 // ---- what it answers (connector.h)

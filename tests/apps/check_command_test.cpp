@@ -225,6 +225,67 @@ TEST(CheckCommand, SaysWhichEngineIntegratesTheMachineAndWhy) {
               "reference tractor (14 masses, 20 devices, integrated by etd3: 17 speeds and twists)");
 }
 
+// ---- warnings ------------------------------------------------------------------------------------------
+
+// What is said of a model written into a file.
+nlohmann::json checked_text(const std::string& text, std::vector<std::string> options = {}) {
+    const auto path = std::filesystem::temp_directory_path() / "shiftrig_warned.yaml";
+    std::ofstream(path) << text;
+    options.insert(options.begin(), {path.string(), "--json"});
+    const Said said = check(options);
+    std::filesystem::remove(path);
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    return nlohmann::json::parse(said.out);
+}
+
+TEST(CheckCommand, ShippedModelsWarnOfNothingButResonances) {
+    for (const auto& entry : std::filesystem::directory_iterator(config)) {
+        if (entry.path().extension() != ".yaml" ||
+            test::whole(entry.path()).find("\nmasses:") == std::string::npos)
+            continue;  // not a model
+        for (const auto& warning : checked(entry.path().filename()).at("warnings"))
+            EXPECT_NE(warning.get<std::string>().find("engine order 3 meets the mode"), std::string::npos)
+                << entry.path() << ": " << warning;
+    }
+}
+
+TEST(CheckCommand, StatesOfAMachineWithoutGearPathsAreListedAndMetByTheEnginesOrder) {
+    const auto answer = checked_text(R"(name: engine on a shaft
+masses: {engine: {inertia_kg_m2: 2}, load: {inertia_kg_m2: 5}, tail: {inertia_kg_m2: 5}}
+shafts: {s: {a: engine, b: load, stiffness_nm_per_rad: 200000, damping_nm_s_per_rad: 2}}
+clutches: {K: {a: load, b: tail, dry: {sliding_capacity_nm: 10, static_ratio: 1}, direct: {}, initially_locked: true}}
+engines:
+  e: {mass: engine, full_load_rpm_nm: [[700, 500], [2000, 500]], governor_slope_nm_s_per_rad: 100,
+      low_idle_rpm: 800, high_idle_rpm: 2500, friction_constant_nm: 50, friction_per_speed_nm_s_per_rad: 0.3,
+      actuator_lag_s: 0.04, turbo_instant_fraction: 1, turbo_lag_s: 0.5, fade_from_rpm: 700, fade_to_rpm: 500,
+      stall_speed_rpm: 400, cylinders: 4}
+)");
+    const auto& states = answer.at("states");
+    ASSERT_EQ(states.size(), 2u);
+    EXPECT_EQ(states[0].at("name"), "all closed");  // which is how it starts
+    EXPECT_EQ(states[0].at("closed"), nlohmann::json{"K"});
+    EXPECT_EQ(states[1].at("name"), "all open");
+    EXPECT_EQ(states[1].at("modes_hz"), answer.at("open").at("modes_hz"));
+    EXPECT_EQ(answer.at("modes").at("all closed").size(), 1u);
+    EXPECT_EQ(answer.at("warnings"),
+              nlohmann::json(
+                  {"all closed: engine order 2 meets the mode at 55.1 Hz at 1654 rpm (damping ratio 0.00)",
+                   "all open: engine order 2 meets the mode at 59.6 Hz at 1787 rpm (damping ratio 0.00)"}));
+}
+
+TEST(CheckCommand, WhatStepsDoNotResolveDependsOnTheRate) {
+    const std::string text = R"(name: stiff and light
+masses: {a: {inertia_kg_m2: 1}, t: {inertia_kg_m2: 1.0e-5}, b: {inertia_kg_m2: 1}}
+shafts:
+  s: &shaft {a: a, b: t, stiffness_nm_per_rad: 30000, damping_nm_s_per_rad: 0.001}
+  r: {<<: *shaft, a: t, b: b}
+clutches: {K: {a: t, b: housing, dry: {sliding_capacity_nm: 1, static_ratio: 1.2}, direct: {}}}
+)";
+    EXPECT_EQ(checked_text(text).at("warnings").size(), 1u);
+    EXPECT_EQ(checked_text(text, {"--rate-hz", "2500"}).at("warnings").size(), 0u);
+    EXPECT_EQ(check({config + "tractor.yaml", "--rate-hz", "0"}).exit_code, 2);
+}
+
 // ---- what is wrong ---------------------------------------------------------------------------------------
 
 TEST(CheckCommand, AWrongModelIsOneLineAndCodeTwo) {

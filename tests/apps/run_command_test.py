@@ -165,6 +165,17 @@ class Results(InAFolder):
             text = run(machine_with(method), "--pace", "free", "--controller", "none", "--duration", "0.1").stdout
             self.assertRegex(text, r"in \d+ of 100 ticks even the shortest parts of a step are coarse", method)
 
+    def test_initial_speeds_that_contradict_a_gear_are_told(self):
+        machine = self.path("geared.yaml")
+        with open(machine, "w") as file:
+            file.write("name: geared\nmasses: {a: {inertia_kg_m2: 1, initial_speed_rad_s: 10}, b: {inertia_kg_m2: 1}}\n"
+                       "gears: {g: {a: a, b: b, ratio: 2, efficiency: 1}}\n")
+        done = run(machine, "--pace", "free", "--controller", "none", "--duration", "0.01", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr, 'initial speeds contradict gear "g": the run begins with "a" at 8 rad/s instead of 10, '
+                                      '"b" at 4 rad/s instead of 0\n')
+        self.assertAlmostEqual(json.loads(done.stdout)["final"]["mass.a.speed_rad_s"], 8, 12)
+
     def test_csv_has_every_tick_and_names_with_units(self):
         path = self.path("shift.csv")
         result = free("--csv", path)

@@ -258,6 +258,8 @@ TEST(ModelFile, WhatThePlantRefusesIsShownAsWritten) {
         "      turbo_lag_s: 0.5, fade_from_rpm: 700, fade_to_rpm: 500, stall_speed_rpm: 400}\n";
     EXPECT_EQ(refusal(two_masses + engine),
               "m.yaml:7:26: engine \"e\": high_idle_rpm = 800; must be > low_idle");
+    EXPECT_EQ(refusal(two_masses + replaced(engine, "low_idle_rpm: 900", "cylinders: 0, low_idle_rpm: 900")),
+              "m.yaml:7:7: engine \"e\": cylinders = 0; must be at least 1");
     EXPECT_EQ(refusal(two_masses + replaced(engine, "[2154, 729]", "[700, 729]")),
               "m.yaml:6:50: engine \"e\": full_load_rpm_nm = [700, 729]; x must rise from pair to pair");
 }

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <complex>
 
-#include "plant/plant.h"
 #include "plant/structure.h"
 #include "tests/plant/machines.h"
 
@@ -235,57 +234,30 @@ TEST(Tractor, RollingTyreDampsTheLowestMode) {
     EXPECT_GT(natural_modes(d, {"Fc", "F2"}, rolling).damped.at(0).damping_ratio, 0.1);
 }
 
-// ---- warnings -----------------------------------------------------------------------------------------
+// ---- states beside the gears ------------------------------------------------------------------------
 
-TEST(Warnings, NameEfficiencyInertiaAndTieUp) {
-    Description d = machines::wt_gearbox();
-    d.planetaries[1].efficiency = 0.4;
-    d.masses[2].inertia = 1e-8;
-    d.clutches.push_back(machines::clutch("C1b", "input", "sun23"));
-    d.gear_paths = {{"double", {"C1", "C1b", "C3"}}};
-    const auto warnings = model_warnings(d);
-    ASSERT_EQ(warnings.size(), 3u);
-    EXPECT_EQ(warnings[0],
-              "planetary row \"row2\": efficiency 0.4 is below 0.5: it holds itself when driven backwards, "
-              "and loss "
-              "directions of several such meshes need not be unique");
-    EXPECT_EQ(
-        warnings[1],
-        "masses \"ring1\" and \"output\": inertia ratio 5e+07 is beyond 1e7: joins and internal torques "
-        "lose digits");
-    EXPECT_EQ(warnings[2],
-              "gear double: the loop of C1, C1b is closed twice: the split of torque is not unique");
+std::vector<std::string> names_of(const std::vector<GearVariant>& states) {
+    std::vector<std::string> names;
+    for (const GearVariant& state : states) names.push_back(state.name);
+    return names;
 }
 
-// 20 Nm more per 0.1 rad/s on 1e-4 kg m²: gone within 0.5 µs.
-TEST(Warnings, NameFrictionThatIsTooSteep) {
-    Description d;
-    d.masses = {machines::mass("light", 1e-4), machines::mass("heavy", 1)};
-    d.clutches = {machines::clutch("F", "light", "heavy", 40), machines::clutch("G", "heavy", "", 40)};
-    for (Clutch& clutch : d.clutches)
-        std::get<DryFriction>(clutch.friction).factor_over_slip = {{0, 0.5}, {0.1, 1}};
-    const auto warnings = model_warnings(d);
-    ASSERT_EQ(warnings.size(), 1u);
-    EXPECT_EQ(warnings[0],
-              "clutch \"F\": its friction rises by 200 Nm s/rad and so slows its lighter mass within 0.5 µs; "
-              "a step of 1 ms resolves no less than 4 µs");
-}
-
-TEST(Warnings, ThirdEngineOrderMeetsTheClutchMode) {
+TEST(OtherStates, AreTheOpenMachineBesideGearPathsElseAlsoTheStartAndAllClosed) {
+    using Names = std::vector<std::string>;
     Description d = tractor();
-    Engine engine;
-    engine.name = "engine";
-    engine.mass = "engine";
-    engine.full_load = {{50, 500}, {200, 900}};
-    engine.governor_slope = 187;
-    engine.low_idle = 900 * turn / 60;
-    engine.high_idle = 2191 * turn / 60;
-    d.engines = {engine};
-    bool found = false;
-    for (const std::string& warning : model_warnings(d)) {
-        found = found || warning.rfind("gear F2/M: engine order 3 meets the mode at 5", 0) == 0;
-    }
-    EXPECT_TRUE(found);
+    EXPECT_EQ(names_of(other_states(d)), Names{"all open"});
+    d.gear_paths.clear();
+    EXPECT_EQ(names_of(other_states(d)), (Names{"all closed/L", "all closed/M", "all closed/H", "all open/L",
+                                                "all open/M", "all open/H"}));
+    d.gears[4].options.clear();
+    d.clutches[0].initially_locked = true;
+    const auto states = other_states(d);
+    EXPECT_EQ(names_of(states), (Names{"as it starts", "all closed", "all open"}));
+    EXPECT_EQ(states[0].closed, Names{"Fc"});
+    EXPECT_EQ(states[1].closed, (Names{"Fc", "F1", "F2", "F3", "F4"}));
+    for (Clutch& clutch : d.clutches) clutch.initially_locked = true;
+    EXPECT_EQ(names_of(other_states(d)), (Names{"all closed", "all open"}));
+    EXPECT_EQ(names_of(other_states(two_inertias())), Names{"all open"});
 }
 
 }  // namespace

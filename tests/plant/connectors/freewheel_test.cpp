@@ -244,7 +244,7 @@ TEST_P(EachEngineAndStep, APairOfThemRectifiesASwing) {
     EXPECT_NEAR(rig.out("energy.defect"), 0, 1e-9 + 6e4 * std::pow(GetParam().h, 3));
 }
 
-// A freewheel behind a worm gear that holds itself: the gear sticks, the freewheel carries nothing.
+// A freewheel beside a worm gear of poor efficiency.
 TEST(Freewheel, BesideALossyMeshItNeitherPullsNorHangs) {
     Description d;
     d.name = "worm and sprag";
