@@ -15,6 +15,7 @@ import unittest
 
 SHIFTRIG, TCU, CONFIG = sys.argv[1:4]
 SHIFT = CONFIG + "/scenarios/plough_upshift.yaml"
+MULTICAST = os.path.dirname(os.path.abspath(__file__)) + "/../io/with_multicast.sh"
 
 
 def run(*arguments, program=SHIFTRIG, prefix=(), **options):
@@ -224,6 +225,42 @@ class Results(InAFolder):
         replayed = subprocess.run([SHIFTRIG, "replay", recording, "--json"], stdout=subprocess.PIPE, text=True)
         self.assertEqual(replayed.returncode, 0)
         self.assertEqual(json.loads(replayed.stdout)["ticks"], result["ticks"])
+
+    def stopped(self, *arguments, after):
+        """SIGTERM once `after()` holds; the result, and the seconds that the program still took."""
+        process = subprocess.Popen([MULTICAST, SHIFTRIG, "run", "--scenario", SHIFT, "--json", *arguments],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.kill)
+        while not after():
+            self.assertIsNone(process.poll())
+            time.sleep(0.05)
+        time.sleep(0.5)
+        asked = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=60)
+        took = time.monotonic() - asked
+        self.assertEqual(process.returncode, 0, err)
+        result = json.loads(out.splitlines()[-1])
+        self.assertEqual(result["loop"]["outcome"], "stopped")
+        return result, took
+
+    def test_sigterm_ends_a_run_in_any_pace_whatever_it_waits_for(self):
+        recording = self.path("cut.lcmlog")
+        recorded = lambda: os.path.exists(recording) and os.path.getsize(recording) > 0
+        for arguments, ticks in (
+                (("--pace", "wall", "--rate-hz", "1", "--factor", "0.001"), 1),  # sleeps 1000 s
+                (("--pace", "lockstep", "--bus", "udpcan:239.74.163.2:43113", "--answer-timeout", "3600"), 10),  # a command cycle
+                (("--pace", "free", "--duration", "1e9"), None),
+                (("--pace", "wall", "--controller", "sleep 1000", "--bus", "inprocess", "--controller-start", "3600"), 0)):
+            with self.subTest(arguments):
+                result, took = self.stopped(*arguments, "--record", recording, after=recorded)
+                self.assertLess(took, 5 if ticks is None else 2)  # the ticks of a free run are judged, too
+                if ticks is not None:
+                    self.assertLessEqual(result["ticks"], ticks)
+                replayed = subprocess.run([SHIFTRIG, "replay", recording, "--json"], stdout=subprocess.PIPE, text=True)
+                self.assertEqual(replayed.returncode, 0)
+                self.assertEqual(json.loads(replayed.stdout)["ticks"], result["ticks"])
+                os.remove(recording)
 
     def test_controller_that_ends_is_told_and_the_safe_command_acts(self):
         done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "exit 3", "--pace", "wall", "--factor", "4",
