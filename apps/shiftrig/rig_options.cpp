@@ -1,6 +1,7 @@
 #include "apps/shiftrig/rig_options.h"
 
 #include <cmath>
+#include <stdexcept>
 
 #include "apps/rig/rehearsal.h"
 #include "apps/shiftrig/arguments.h"
@@ -77,6 +78,7 @@ rt::LoopSettings RigOptions::loop(const rig::Setup& setup) const {
     settings.answer_timeout = std::llround(answer_timeout_s * 1e9);
     const double duration = duration_s.value_or(setup.scenario ? setup.scenario->duration : 0);
     if (duration > 0) settings.slots = std::llround(duration * 1e9 / static_cast<double>(setup.tick_ns));
+    if (settings.slots == 0) throw std::invalid_argument("--duration: less than half a tick");
     return settings;
 }
 

@@ -87,6 +87,7 @@ class BadInput(InAFolder):
             (("--bus", "carrier:pigeon"), "carrier:pigeon: unknown kind"),
             (("--kernel", "abacus"), "abacus"),
             (("--rate-hz", "0"), "--rate-hz"),
+            (("--duration", "1e-7"), "--duration: less than half a tick"),
             (("--controller", "builtin:nosuch.yaml"), "nosuch.yaml"),
             (("--can-replay", "nosuch.log"), "nosuch.log"),
             (("--bus", "inprocess", "--bus", "inprocess"), "only once"),
