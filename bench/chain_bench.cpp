@@ -1,47 +1,53 @@
 // Chains of N masses on shafts with a clutch at every fifth joint: ns per step by length, engine and contact state.
-// The whole step: laws, stages, internal torques, checks, ledger, outputs, certificate.
+// The whole step: laws, stages, internal torques, checks, ledger, outputs, certificate; without the ledger fastest_ns −
+// ledger_ns.
 #include <benchmark/benchmark.h>
 
 #include <string>
 
-#include "plant/plant.h"
+#include "bench/stepping.h"
 
 namespace shiftrig::plant {
 namespace {
 
-// The last two: locked, the torque turns round, and with 20 times as much, so that steps are taken in parts.
-enum class Contact { locked, slipping, alternating, swinging, swinging_hard };
+// Swinging: locked, the torque turns round, hard with 20 times as much, so that steps are taken in parts. Event: the clutch in
+// the middle slips and locks.
+enum class Contact { locked, slipping, alternating, swinging, swinging_hard, event };
 
 Description chain(int n, Contact contact) {
     Description d;
     d.name = "chain";
+    const int middle = (n - 2) / 5 / 2;  // of the clutches, but one between two masses
     int clutches = 0;
+    double speed = 100;
     for (int j = 0; j < n; ++j) {
         const std::string b = "m" + std::to_string(j), a = "m" + std::to_string(j - 1);
         Mass mass;
         mass.name = b;
         mass.inertia = 1 + 0.1 * (j % 7);
-        // Slipping clutches are too weak to close while the benchmark runs.
-        const bool slips =
-            contact == Contact::slipping || (contact == Contact::alternating && clutches % 2 == 1);
+        const bool some_slip = contact == Contact::slipping || contact == Contact::alternating;
         if (j > 0 && (j % 5 == 0 || n == 2)) {
+            const bool closes = contact == Contact::event && clutches == middle;
+            const bool slips = contact == Contact::slipping || closes ||
+                               (contact == Contact::alternating && clutches % 2 == 1);
             Clutch c;
             c.name = "c" + b;
             c.a = a;
             c.b = b;
             DryFriction friction;
-            friction.sliding_capacity = slips ? 1e-3 : 1e6;
+            // Slipping clutches are too weak to close while the benchmark runs.
+            friction.sliding_capacity = closes ? 300 : slips ? 1e-3 : 1e6;
             friction.static_ratio = 1.1;
             c.friction = friction;
             c.actuation = ActuationConstant{};
             c.initially_locked = !slips;
             d.clutches.push_back(c);
             ++clutches;
+            if (some_slip || closes) speed -= 2;
         } else if (j > 0) {
             d.shafts.push_back({"s" + b, a, b, 2e4, 10, 0});
         }
-        const bool together = contact != Contact::slipping && contact != Contact::alternating;
-        mass.initial_speed = together ? 100 : 100 - 2 * clutches;
+        mass.initial_speed = speed;
         d.masses.push_back(mass);
     }
     TorqueSource source;
@@ -55,22 +61,21 @@ Description chain(int n, Contact contact) {
 void step_chain(benchmark::State& bench, Contact contact, Method method) {
     Description d = chain(static_cast<int>(bench.range(0)), contact);
     d.method = method;
-    const Model model = Model::build(d);
-    Operators operators(model);
-    State state(model);
-    Inputs inputs(model);
-    Outputs outputs(model);
-    Scratch scratch(model);
-    double& torque = inputs.value[static_cast<std::size_t>(model.input("source.drive.torque"))];
-    torque = contact == Contact::swinging_hard ? 1000 : 50;
+    Machine machine(d, KernelKind::automatic);
+    const double torque = contact == Contact::swinging_hard ? 1000 : 50;
+    machine.set("source.drive.torque", torque);
+    if (contact == Contact::event) return repeat_event(bench, machine);
     const bool turns = contact == Contact::swinging || contact == Contact::swinging_hard;
-    unsigned steps = 0;
-    for (auto _ : bench) {
-        if (turns && ++steps % 16 == 0) torque = -torque;
-        step(model, operators, state, inputs, outputs, scratch);
+    const auto turn = [&](int n) {
+        if (turns && n % 16 == 0) machine.set("source.drive.torque", n % 32 == 0 ? torque : -torque);
+    };
+    constexpr int steps = 320;
+    for (int n = 0; n < steps; ++n) {
+        turn(n);
+        machine.step();
     }
-    bench.SetLabel(std::string(model.engine()) + " " + std::string(model.kernel()));
-    bench.counters["fall_backs"] = outputs.certificate.fall_backs;
+    repeat(bench, machine, steps, turn);
+    bench.counters["fall_backs"] = machine.outputs.certificate.fall_backs;
 }
 
 BENCHMARK_CAPTURE(step_chain, locked, Contact::locked, Method::automatic)
@@ -94,6 +99,15 @@ BENCHMARK_CAPTURE(step_chain, alternating, Contact::alternating, Method::automat
     ->Arg(10)
     ->Arg(50)
     ->Arg(200)
+    ->Arg(1000);
+BENCHMARK_CAPTURE(step_chain, event, Contact::event, Method::automatic)
+    ->UseManualTime()
+    ->Arg(2)
+    ->Arg(10)
+    ->Arg(50)
+    ->Arg(100)
+    ->Arg(200)
+    ->Arg(500)
     ->Arg(1000);
 BENCHMARK_CAPTURE(step_chain, swinging, Contact::swinging, Method::automatic)->Arg(50)->Arg(200)->Arg(1000);
 BENCHMARK_CAPTURE(step_chain, swinging_hard, Contact::swinging_hard, Method::automatic)

@@ -111,19 +111,36 @@ void sensitivity(std::FILE* out) {
         const char* name;
         double cases::Estimates::*member;
     };
-    constexpr Factor factors[] = {{"shaft stiffness", &cases::Estimates::shaft_stiffness},
-                                  {"shaft damping", &cases::Estimates::shaft_damping},
-                                  {"wheel inertia", &cases::Estimates::wheel_inertia},
-                                  {"tyre relaxation length", &cases::Estimates::tyre_relaxation},
-                                  {"valve frequency", &cases::Estimates::valve_frequency},
-                                  {"valve dead time", &cases::Estimates::dead_time},
-                                  {"rise of friction at low slip", &cases::Estimates::friction_rise}};
+    using E = cases::Estimates;
+    constexpr Factor factors[] = {{"shaft stiffness", &E::shaft_stiffness},
+                                  {"shaft damping", &E::shaft_damping},
+                                  {"wheel inertia", &E::wheel_inertia},
+                                  {"inertias between engine and wheels", &E::other_inertias},
+                                  {"engine inertia", &E::engine_inertia},
+                                  {"engine lag", &E::engine_lag},
+                                  {"torque without boost", &E::turbo_instant},
+                                  {"turbo lag", &E::turbo_lag},
+                                  {"losses of gears", &E::gear_losses},
+                                  {"capacity of Fc", &E::main_capacity},
+                                  {"friction of F1…F4", &E::friction},
+                                  {"rise of friction at low slip", &E::friction_rise},
+                                  {"slip over which it rises", &E::friction_speed},
+                                  {"valve dead time", &E::dead_time},
+                                  {"valve frequency", &E::valve_frequency},
+                                  {"valve damping", &E::valve_damping},
+                                  {"valve slew", &E::slew},
+                                  {"fill volume", &E::fill_volume},
+                                  {"fill flow", &E::fill_flow},
+                                  {"preload of the spring", &E::preload},
+                                  {"spring at full stroke", &E::return_spring},
+                                  {"tyre relaxation length", &E::tyre_relaxation}};
     std::fputs(
         "case,estimate,factor,peak damper torque,peak axle torque,clutch heat,locked at,peak acceleration\n",
         out);
     const auto line = [&](int c, const char* name, double factor, const cases::Estimates& estimates) {
         const auto machine = cases::tractor_shift(shifts[c], estimates);
-        const ShiftTrace trace = run_plant(machine, 1);
+        const ShiftTrace trace =
+            run_plant(machine, 1, [&](plant::Description& d) { cases::add_pistons(d, estimates); });
         double damper = 0, axle = 0, acceleration = 0, locked = -1;
         for (std::size_t k = 0; k < trace.rows.size(); ++k) {
             damper = std::max(damper, std::abs(trace.rows[k][5]));

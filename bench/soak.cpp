@@ -27,6 +27,7 @@
 
 #include "apps/rig/choices.h"
 #include "apps/rig/session.h"
+#include "apps/shiftrig/arguments.h"
 #include "rt/clock.h"
 #include "rt/thread.h"
 
@@ -152,9 +153,13 @@ int main(int argc, char** argv) {
     CLI::App app{"scenarios in a loop, free-running, watched", "shiftrig_soak"};
     double hours = 24;
     std::vector<std::string> scenarios;
-    app.add_option("--hours", hours, "simulated")->check(CLI::PositiveNumber)->capture_default_str();
+    cli::add_number(app, "--hours", hours, {0, 1e5, true}, "simulated")->capture_default_str();
     app.add_option("SCENARIO", scenarios, "files")->required();
-    CLI11_PARSE(app, argc, argv);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    }
     // Memory that was ever needed stays with the process, and what will be needed is there: "flat" can mean to the page.
     rt::set_up_memory({.lock = false});
 

@@ -1,84 +1,52 @@
 // ns per complete step (inputs, valves, forces, stages, internal torques, checks, ledger, outputs, certificate)
-// of the machines in config/, locked and shifting, on each kernel this processor has; the bare products of
-// the method beside it, so that a busy machine can be told from a slow program.
+// of the machines in config/, locked, slipping and in a step with one event, on each kernel this processor has; the bare
+// products of the method beside it, so that a busy machine can be told from a slow program. Without the ledger a step takes
+// fastest_ns − ledger_ns.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <chrono>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "bench/stepping.h"
 #include "io/model_file.h"
 #include "plant/kernels.h"
-#include "plant/ledger.h"
-#include "plant/plant.h"
 
 namespace shiftrig::plant {
 namespace {
 
-struct Machine {
-    Machine(const std::string& file, KernelKind kernel)
-        : model(Model::build(io::read_model(std::string(SHIFTRIG_CONFIG "/") + file).description,
-                             {1e-3, kernel})),
-          operators(model),
-          state(model),
-          scratch(model),
-          inputs(model),
-          outputs(model) {}
-    void set(const std::string& name, double value) {
-        const int index = model.input(name);
-        if (index >= 0) inputs.value[static_cast<std::size_t>(index)] = value;
-    }
-    void step() { plant::step(model, operators, state, inputs, outputs, scratch); }
+enum class Contact { locked, slipping, event };
 
-    Model model;
-    Operators operators;
-    State state;
-    Scratch scratch;
-    Inputs inputs;
-    Outputs outputs;
-};
-
-// Steps from a snapshot, `steps` at a time, so that every repetition does the same work. The fastest of them tells a
-// busy machine from a slow program.
-void repeat(benchmark::State& bench, Machine& machine, int steps) {
-    const std::vector<std::byte> snapshot(machine.state.bytes().begin(), machine.state.bytes().end());
-    long events = 0;
-    double fastest = 1e300;
-    while (bench.KeepRunningBatch(steps)) {  // the time reported is that of one step
-        machine.state.restore(snapshot);
-        const auto begin = std::chrono::steady_clock::now();
-        for (int n = 0; n < steps; ++n) {
-            machine.step();
-            events += machine.outputs.certificate.events;
-        }
-        const std::chrono::duration<double, std::nano> taken = std::chrono::steady_clock::now() - begin;
-        fastest = std::min(fastest, taken.count() / steps);
-    }
-    bench.counters["fastest_ns"] = fastest;
-    bench.counters["events_per_step"] = static_cast<double>(events) / static_cast<double>(bench.iterations());
-    bench.SetLabel(std::string(machine.model.kernel()));
+Machine machine_of(const std::string& file, KernelKind kernel) {
+    return {io::read_model(std::string(SHIFTRIG_CONFIG "/") + file).description, kernel};
 }
 
-void two_mass(benchmark::State& bench, KernelKind kernel) {
-    Machine machine("two_mass.yaml", kernel);
-    repeat(bench, machine, 1000);
+// Slips for 90 steps from its start, then locks.
+void two_mass(benchmark::State& bench, KernelKind kernel, Contact contact) {
+    Machine machine = machine_of("two_mass.yaml", kernel);
+    if (contact == Contact::event) return repeat_event(bench, machine);
+    if (contact == Contact::locked) machine.step(100);
+    repeat(bench, machine, contact == Contact::slipping ? 80 : 1000);
 }
 
-// Third gear of [Algin] Table 2, 100 Nm through; shifting, its brake C3 slips under a tenth of what it can.
-void wt_gearbox(benchmark::State& bench, KernelKind kernel, bool shifting) {
-    Machine machine("wt_gearbox.yaml", kernel);
+// Third gear of [Algin] Table 2, 100 Nm through; slipping, its brake C3 has a tenth of what it can; it locks when it gets
+// a little more than it needs.
+void wt_gearbox(benchmark::State& bench, KernelKind kernel, Contact contact) {
+    Machine machine = machine_of("wt_gearbox.yaml", kernel);
     for (const char* closed : {"clutch.C1.engagement", "clutch.C3.engagement"}) machine.set(closed, 1);
     machine.set("source.input.torque", 100);
     machine.set("source.output.torque", -150);
     start(machine.model, machine.state, {{"C1", "C3"}, {{"input", 150}}}, machine.inputs);
-    for (int n = 0; n < 200; ++n) machine.step();
-    if (shifting) {
+    machine.step(200);
+    if (contact != Contact::locked) {
         machine.set("clutch.C3.engagement", 0.005);
-        for (int n = 0; n < 100; ++n) machine.step();
+        machine.step(100);
     }
-    repeat(bench, machine, shifting ? 100 : 1000);
+    if (contact == Contact::event) {
+        machine.set("clutch.C3.engagement", 0.1);
+        return repeat_event(bench, machine);
+    }
+    repeat(bench, machine, contact == Contact::slipping ? 100 : 1000);
 }
 
 // So many steps of a tractor under the plough, in F2.
@@ -87,55 +55,32 @@ void plough(Machine& machine, int steps) {
     machine.set("environment.draft", 1);
     machine.set("clutch.F2.pressure_command", 18e5);
     start(machine.model, machine.state, {{"Fc", "F2"}, {{"engine", 188.6}}}, machine.inputs);
-    for (int n = 0; n < steps; ++n) machine.step();
+    machine.step(steps);
 }
 
-// Ploughing in F2; with `shifting`, F2 and F3 slip against each other all the time.
-void tractor(benchmark::State& bench, const std::string& file, KernelKind kernel, bool shifting) {
-    Machine machine(file, kernel);
+// Ploughing in F2; slipping, F2 and F3 do so against each other all the time; F3 locks when it gets the pressure for it.
+void tractor(benchmark::State& bench, const std::string& file, KernelKind kernel, Contact contact) {
+    Machine machine = machine_of(file, kernel);
     plough(machine, 3000);
-    if (shifting) {
+    if (contact != Contact::locked) {
         machine.set("clutch.F2.pressure_command", 3e5);
         machine.set("clutch.F3.pressure_command", 5e5);
-        for (int n = 0; n < 300; ++n) machine.step();
+        machine.step(300);
     }
-    repeat(bench, machine, shifting ? 500 : 1000);
-}
-
-// What the ledger has in a step of the tractor: the last step's account, booked over and over.
-void ledger(benchmark::State& bench, KernelKind kernel) {
-    Machine machine("tractor.yaml", kernel);
-    plough(machine, 1000);
-    const detail::ModelData& m = machine.model.data();
-    detail::OperatorsData& operators = machine.operators.data();
-    detail::ScratchData& scratch = machine.scratch.data();
-    double* block = machine.state.block.data();
-    auto* contact = reinterpret_cast<unsigned char*>(block + m.layout.contact);
-    detail::Work work{m,   operators, block, block, machine.outputs, scratch, contact, machine.state.time(),
-                      1e-3};
-    std::swap(scratch.first, scratch.last);  // the step left its end where the next one begins
-    const detail::Mode& mode = detail::find_mode(m, operators, contact, scratch);
-    double fastest = 1e300;
-    constexpr int batch = 1000;
-    while (bench.KeepRunningBatch(batch)) {
-        const auto begin = std::chrono::steady_clock::now();
-        for (int i = 0; i < batch; ++i) {
-            detail::book(work, mode);
-            benchmark::ClobberMemory();
-        }
-        const std::chrono::duration<double, std::nano> taken = std::chrono::steady_clock::now() - begin;
-        fastest = std::min(fastest, taken.count() / batch);
+    if (contact == Contact::event) {
+        machine.set("clutch.F2.pressure_command", 0);
+        machine.set("clutch.F3.pressure_command", 12e5);
+        return repeat_event(bench, machine);
     }
-    bench.counters["fastest_ns"] = fastest;
-    bench.SetLabel(std::string(machine.model.kernel()));
+    repeat(bench, machine, contact == Contact::slipping ? 500 : 1000);
 }
 
 // The dearest step of a shift F2 to F3 under the plough, new modes included: of each step the fastest of 20 repeats, of
 // those the slowest.
 void worst_step(benchmark::State& bench, KernelKind kernel) {
-    Machine machine("tractor.yaml", kernel);
+    Machine machine = machine_of("tractor.yaml", kernel);
     plough(machine, 1000);
-    const std::vector<std::byte> snapshot(machine.state.bytes().begin(), machine.state.bytes().end());
+    const std::vector<std::byte> snapshot = machine.snapshot();
     constexpr int steps = 1500, repeats = 20;
     std::vector<double> fastest(steps, 1e300);
     long misses = 0, events = 0;
@@ -150,12 +95,10 @@ void worst_step(benchmark::State& bench, KernelKind kernel) {
                 if (n == 100) machine.set("clutch.F3.pressure_command", 2e5);
                 if (n == 220) machine.set("clutch.F3.pressure_command", 11.5e5);
                 if (n == 300) machine.set("clutch.F2.pressure_command", 0);
-                const auto begin = std::chrono::steady_clock::now();
-                machine.step();
-                const std::chrono::duration<double, std::nano> taken =
-                    std::chrono::steady_clock::now() - begin;
                 auto& least = fastest[static_cast<std::size_t>(n)];
-                least = std::min(least, taken.count());
+                const Stopwatch watch;
+                machine.step();
+                least = std::min(least, watch.nanoseconds());
                 misses += machine.outputs.certificate.mode_misses;
                 events += machine.outputs.certificate.events;
             }
@@ -178,7 +121,7 @@ void bare_products(benchmark::State& bench, KernelKind kind) {
     double fastest = 1e300;
     constexpr int batch = 100;
     while (bench.KeepRunningBatch(batch)) {
-        const auto begin = std::chrono::steady_clock::now();
+        const Stopwatch watch;
         for (int i = 0; i < batch; ++i) {
             kernel.multiply(panel.data(), rows, n + m, v.data(), nullptr, y.data());
             kernel.multiply(panel.data(), rows, n, v.data(), nullptr, z.data());
@@ -188,8 +131,7 @@ void bare_products(benchmark::State& bench, KernelKind kind) {
             benchmark::DoNotOptimize(y.data());
             benchmark::ClobberMemory();
         }
-        const std::chrono::duration<double, std::nano> taken = std::chrono::steady_clock::now() - begin;
-        fastest = std::min(fastest, taken.count() / batch);
+        fastest = std::min(fastest, watch.nanoseconds() / batch);
     }
     bench.counters["fastest_ns"] = fastest;
     bench.SetLabel(kernel.name);
@@ -201,17 +143,20 @@ void add(KernelKind kernel, const std::string& name) {
     } catch (const ModelError&) {
         return;
     }
-    const auto in = [&name](const char* what) { return std::string(what) + "/" + name; };
+    const auto in = [&name](const std::string& what) { return what + "/" + name; };
     benchmark::RegisterBenchmark(in("bare_products").c_str(), bare_products, kernel);
-    benchmark::RegisterBenchmark(in("two_mass").c_str(), two_mass, kernel);
-    benchmark::RegisterBenchmark(in("tractor_ledger").c_str(), ledger, kernel);
     benchmark::RegisterBenchmark(in("worst_step").c_str(), worst_step, kernel);
-    benchmark::RegisterBenchmark(in("wt_gearbox_locked").c_str(), wt_gearbox, kernel, false);
-    benchmark::RegisterBenchmark(in("wt_gearbox_shifting").c_str(), wt_gearbox, kernel, true);
-    for (const char* file : {"article_tractor.yaml", "tractor.yaml"}) {
-        const std::string machine = std::string(file).substr(0, std::string(file).find('.'));
-        benchmark::RegisterBenchmark((machine + "_locked/" + name).c_str(), tractor, file, kernel, false);
-        benchmark::RegisterBenchmark((machine + "_shifting/" + name).c_str(), tractor, file, kernel, true);
+    for (const auto& [suffix, contact] :
+         {std::pair{"_locked", Contact::locked}, std::pair{"_shifting", Contact::slipping},
+          std::pair{"_event", Contact::event}}) {
+        const auto add_one = [&, end = std::string(suffix)](const std::string& machine, auto... what) {
+            auto* bench = benchmark::RegisterBenchmark(in(machine + end).c_str(), what..., contact);
+            if (contact == Contact::event) bench->UseManualTime();
+        };
+        add_one("two_mass", two_mass, kernel);
+        add_one("wt_gearbox", wt_gearbox, kernel);
+        add_one("article_tractor", tractor, "article_tractor.yaml", kernel);
+        add_one("tractor", tractor, "tractor.yaml", kernel);
     }
 }
 

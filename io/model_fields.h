@@ -468,8 +468,9 @@ void fields(Fields& f, ModelText& model) {
                                     {"etd3", plant::Method::etd3},
                                     {"ark3", plant::Method::ark3}},
              "integration; [automatic] goes by the model's size");
-    f.optional_integer("maximum_events", d.maximum_events, at_least_one, "localised per step [4]");
-    f.optional_integer("maximum_parts", d.maximum_parts, at_least_one,
+    f.optional_integer("maximum_events", d.maximum_events, {1, plant::Description::most_events},
+                       "localised per step, in each of its parts [4]");
+    f.optional_integer("maximum_parts", d.maximum_parts, {1, plant::Description::most_parts},
                        "of a step where shafts swing or forces change too fast for one [16]; 1: never");
 }
 

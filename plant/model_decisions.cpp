@@ -35,7 +35,7 @@ void divide_step(ModelData& m, double reach, int most) {
 // ωh a phase of order (ωh)⁴, which hundreds of contacts add up: half a radian, not one. Friction that rises with speed is
 // a damper that the step does not take exactly: its parts are to be short against its time constant.
 void bound_step(ModelData& m) {
-    constexpr int most_for_flanks = 1 << 14, most_for_friction = 256;
+    constexpr int most_for_flanks = 1 << 14, most_for_friction = Description::most_parts;
     m.maximum_events = m.description.maximum_events;
     m.maximum_parts = m.description.maximum_parts;
     for (int k = 0; k < m.pairs; ++k) {

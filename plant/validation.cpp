@@ -108,12 +108,13 @@ void validate(const Description& d) {
                 joints.translating(kind(device), device.name, end.field, end.mass);
         }
     });
-    const auto at_least_one = [&](const char* field, int value) {
-        if (value < 1)
-            throw ModelError("model", d.name, field, "= " + std::to_string(value) + "; must be >= 1");
+    const auto between_one_and = [&](int most, const char* field, int value) {
+        if (value < 1 || value > most)
+            throw ModelError("model", d.name, field,
+                             "= " + std::to_string(value) + "; must be within 1 and " + std::to_string(most));
     };
-    at_least_one("maximum_events", d.maximum_events);
-    at_least_one("maximum_parts", d.maximum_parts);
+    between_one_and(Description::most_events, "maximum_events", d.maximum_events);
+    between_one_and(Description::most_parts, "maximum_parts", d.maximum_parts);
     if (d.oil) {
         const Check check("oil", "oil");
         check.positive("viscosity_at_zero", d.oil->viscosity_at_zero);

@@ -14,10 +14,12 @@
 //     loop.run([&](const Tick& tick) SHIFTRIG_REALTIME { … });
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 
 #include "rt/clock.h"
@@ -38,7 +40,7 @@ struct LoopSettings {
     std::int64_t period = 1'000'000;                                // T [ns], > 0
     std::int64_t slots = std::numeric_limits<std::int64_t>::max();  // how many to pass
     Pace pace = Pace::wall;
-    double factor = 1;            // f: simulated time per wall time, > 0
+    double factor = 1;            // f: simulated time per wall time, finite and > 0
     std::int64_t catch_up = 100;  // [slots], ≥ 0
     BeyondBound beyond_bound = BeyondBound::skip;
     std::int64_t late_after =
@@ -79,7 +81,9 @@ struct LoopReport {
     Histogram response;  // end of the callable − deadline
 };
 
-// What other threads (and signal handlers) may ask of a running loop.
+// What other threads (and signal handlers) may ask of a running loop. It obeys within `longest_wait` and one tick, whatever
+// it waits for: a signal ends the sleep of the thread that takes it, which need not be the loop's.
+inline constexpr std::int64_t longest_wait = 250'000'000;  // [ns]
 class LoopControl {
   public:
     void stop() noexcept { stop_.store(true, std::memory_order_relaxed); }
@@ -108,6 +112,8 @@ class Loop {
   public:
     explicit Loop(const LoopSettings& settings, C clock = {})
         : settings_(settings), clock_(std::move(clock)) {
+        if (!(settings.factor > 0 && std::isfinite(settings.factor)))
+            throw std::invalid_argument("the loop's time factor must be a finite number > 0");
         control_.set_factor(settings.factor);
     }
 
@@ -134,7 +140,7 @@ class Loop {
                 follow_factor(slot);
                 tick.deadline = deadline(slot);
                 wait_for(tick.deadline);
-            } else if (settings_.pace == Pace::lockstep && slot > 0 && !answer(settings_.answer_timeout)) {
+            } else if (settings_.pace == Pace::lockstep && slot > 0 && !answered(answer)) {
                 tick.answered = false;
                 ++report_.unanswered;
             }
@@ -151,10 +157,11 @@ class Loop {
                     return end(Outcome::too_far_behind);
                 if (too_often && settings_.late_run == LateRun::abort) return end(Outcome::late_too_often);
                 if (too_far || (too_often && settings_.late_run == LateRun::skip)) {
-                    for (; tick.skipped < behind; ++tick.skipped) {
+                    for (; tick.skipped < behind && !control_.stopping(); ++tick.skipped) {
                         tick.late = count_start(tick.start - deadline(++slot));
                     }
-                    report_.skipped += behind;
+                    report_.skipped += tick.skipped;
+                    if (control_.stopping()) return end(Outcome::stopped);
                     tick.slot = slot;
                     tick.deadline = deadline(slot);
                 }
@@ -185,9 +192,12 @@ class Loop {
         const double passed =
             static_cast<double>(time - anchor_time_) * factor_ / static_cast<double>(settings_.period);
         std::int64_t due = anchor_slot_ + static_cast<std::int64_t>(passed);
-        while (deadline(due) > time) --due;
-        while (deadline(due + 1) <= time) ++due;
-        return due < settings_.slots ? due : settings_.slots - 1;
+        // Rounding is worth one slot. No search: it would not hear that the run is to stop.
+        if (deadline(due) > time)
+            --due;
+        else if (deadline(due + 1) <= time)
+            ++due;
+        return std::clamp(due, slot, settings_.slots - 1);
     }
     void place_anchor(std::int64_t time, std::int64_t slot) noexcept {
         anchor_time_ = time;
@@ -217,10 +227,21 @@ class Loop {
         std::int64_t present = now();
         if (present >= time) return;
         while (present < time && !control_.stopping()) {
-            clock_.sleep_until(time);
+            clock_.sleep_until(std::min(time, present + longest_wait));
             present = now();
         }
-        report_.wake_up.record(present - time);
+        if (present >= time) report_.wake_up.record(present - time);
+    }
+    template <class Answer>
+    bool answered(Answer& answer) {
+        for (std::int64_t left = settings_.answer_timeout; !control_.stopping();) {
+            const std::int64_t piece = std::min(left, longest_wait), asked = now();
+            if (answer(piece)) return true;
+            left -= piece;
+            // Who comes back at once has nobody to wait for.
+            if (left == 0 || now() - asked < piece / 2) return false;
+        }
+        return true;
     }
     // Books the start of one slot, executed or not; true if it is late.
     bool count_start(std::int64_t lateness) noexcept {

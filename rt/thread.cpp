@@ -69,6 +69,7 @@ Refusals set_up_thread(const ThreadSettings& settings) {
         CPU_ZERO(&set);
         std::string list;
         for (const int processor : settings.processors) {
+            static_assert(most_processors == CPU_SETSIZE);
             if (processor >= 0 && processor < CPU_SETSIZE) CPU_SET(processor, &set);
             if (!list.empty()) list += ',';
             list += std::to_string(processor);

@@ -17,6 +17,8 @@ struct Refusal {
 std::string to_string(const Refusal& refusal);
 using Refusals = std::vector<Refusal>;
 
+inline constexpr int most_processors = 1024;  // that an affinity can name: CPU_SETSIZE
+
 struct ThreadSettings {
     std::string name = "plant";               // as seen in top and traces, at most 15 characters
     int fifo_priority = 0;                    // 1…99; 0 leaves the thread as it is

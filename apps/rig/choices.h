@@ -10,8 +10,8 @@ namespace shiftrig::rig {
 
 struct Choices {
     std::string model, scenario;     // files; one of them may be empty: a scenario names its model
-    double rate_hz = 1000;           // of the ticks
-    int substeps = 1;                // plant steps per tick
+    double rate_hz = 1000;           // of the ticks, 1 to 1e5
+    int substeps = 1;                // plant steps per tick, ≥ 1
     std::vector<std::string> buses;  // empty: inprocess, where the model says what frames mean
     std::string controller;       // "builtin[:FILE]", "none", a command to start; empty: the scenario's, else
                                   // builtin on the in-process bus and nobody elsewhere

@@ -1,9 +1,9 @@
 #include "apps/rig/variation.h"
 
 #include <cmath>
-#include <cstdlib>
 
 #include "io/input_error.h"
+#include "io/number.h"
 #include "io/yaml_document.h"
 
 namespace shiftrig::rig {
@@ -22,12 +22,11 @@ std::vector<std::string> split(const std::string& text, char separator) {
 }
 
 double number(const std::string& text, const std::string& whole) {
-    char* end = nullptr;
-    const double value = std::strtod(text.c_str(), &end);
-    if (text.empty() || *end != '\0' || !std::isfinite(value))
+    const auto value = io::finite_number(text);
+    if (!value)
         throw io::InputError("--vary " + whole + ": \"" + text +
                              "\" is not a number; write NAME=A,B,C or NAME=LOW:HIGH[:COUNT] or NAME=+-P%");
-    return value;
+    return *value;
 }
 
 // SplitMix64 [Steele 2014]: a good number from any counter.
@@ -72,6 +71,7 @@ Variation parse_variation(const std::string& text) {
     const std::string range = text.substr(equals + 1);
     if (range.starts_with("+-") && range.ends_with("%")) {
         const double share = number(range.substr(2, range.size() - 3), text) / 100;
+        if (share <= 0) throw io::InputError("--vary " + text + ": P must be > 0");
         v.relative = true;
         v.low = 1 - share;
         v.high = 1 + share;
@@ -84,10 +84,11 @@ Variation parse_variation(const std::string& text) {
     }
     v.low = number(bounds[0], text);
     v.high = number(bounds[1], text);
+    if (!std::isfinite(v.high - v.low)) throw io::InputError("--vary " + text + ": too far apart");
     if (bounds.size() == 2) return v;
     const double count = number(bounds[2], text);
-    if (bounds.size() > 3 || count < 2 || count > 1e6)
-        throw io::InputError("--vary " + text + ": LOW:HIGH:COUNT needs a count from 2 to 1000000");
+    if (bounds.size() > 3 || count < 2 || count > 1e6 || count != std::floor(count))
+        throw io::InputError("--vary " + text + ": LOW:HIGH:COUNT needs a whole count from 2 to 1000000");
     for (int i = 0; i < static_cast<int>(count); ++i)
         v.values.push_back(v.low + (v.high - v.low) * i / (count - 1));
     return v;

@@ -33,11 +33,10 @@ nlohmann::json to_json(const rig::RunCertificate& c, const plant::Description& m
 
 std::string describe(const rig::RunCertificate& c, double dissipated) {
     std::string text = fmt::format(
-        "plant     {} events, {} fall-backs, {} modes built; torque residual {:.1e}, constraints {:.1e} "
-        "rad/s at most; "
-        "energy defect {:.2g} J of {:.4g} J lost\n",
-        c.events, c.fall_backs, c.mode_misses, c.torque_residual, c.constraint_violation, c.energy_defect,
-        dissipated);
+        "plant     {} events, {} fall-backs, {} mode look-ups, {} modes built; torque residual {:.1e}, "
+        "constraints {:.1e} rad/s at most; energy defect {:.2g} J of {:.4g} J lost\n",
+        c.events, c.fall_backs, c.mode_lookups, c.mode_misses, c.torque_residual, c.constraint_violation,
+        c.energy_defect, dissipated);
     for (std::size_t bit = 0; bit < c.flagged.size(); ++bit) {
         if (c.flagged[bit] > 0)
             text += fmt::format("          in {} of {} ticks {}\n", c.flagged[bit], c.ticks, flags[bit].text);

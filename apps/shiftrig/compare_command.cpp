@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/compare.h"
+#include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/command.h"
 
 namespace shiftrig::cli {
@@ -70,8 +71,8 @@ Command::Run declare(CLI::App& app) {
         ->required();
     app.add_option("AFTER", options->after, "the same runs, later")->required();
     app.add_option("--limits", options->limits, "limits (default: those of config/limits.yaml)");
-    app.add_option("--tolerance", options->tolerance_percent, "changes up to this many percent are none")
-        ->check(CLI::NonNegativeNumber)
+    add_number(app, "--tolerance", options->tolerance_percent, {0, 1e6},
+               "changes up to this many percent are none")
         ->capture_default_str();
     app.add_flag("--json", options->json, "for programs");
     app.footer("Exit code 1 if anything got worse or a shift is missing.");

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "apps/rig/fork.h"
+#include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/command.h"
 #include "io/recording/snapshot.h"
 
@@ -132,18 +133,17 @@ Command::Run declare(CLI::App& app) {
                    "NAME=LOW:HIGH[:COUNT] | NAME=+-P%; repeatable")
         ->required()
         ->take_all();
-    app.add_option("--branches", options->branches, "how many, where something is drawn at random")
-        ->check(CLI::Range(1, 10'000'000))
+    constexpr double most_branches = 10'000'000, most_threads = 1024;
+    add_number(app, "--branches", options->branches, {1, most_branches},
+               "how many, where something is drawn at random")
         ->capture_default_str();
-    app.add_option("--seed", options->seed, "of what is drawn at random")->capture_default_str();
-    app.add_option("--duration", options->fork.duration, "simulated seconds of each")
-        ->check(CLI::PositiveNumber)
+    add_number(app, "--seed", options->seed, {0, 1e18}, "of what is drawn at random")->capture_default_str();
+    add_number(app, "--duration", options->fork.duration, {0, 3600, true}, "simulated seconds of each")
         ->capture_default_str();
-    app.add_option("--threads", options->fork.threads, "0: as many as there are processors")
-        ->check(CLI::NonNegativeNumber)
+    add_number(app, "--threads", options->fork.threads, {0, most_threads},
+               "0: as many as there are processors")
         ->capture_default_str();
-    app.add_option("--top", options->top, "how many of the best to print")
-        ->check(CLI::PositiveNumber)
+    add_number(app, "--top", options->top, {1, most_branches}, "how many of the best to print")
         ->capture_default_str();
     app.add_flag("--json", options->json, "all of them, best first, as one JSON array");
     return [options] { return run(*options); };

@@ -11,6 +11,11 @@ int main(int argc, char** argv) {
     CLI::App app{"shiftrig: a bench on which shift-control software meets a tractor", "shiftrig"};
     app.set_version_flag("--version", "shiftrig " SHIFTRIG_VERSION);
     app.require_subcommand(0, 1);  // none is answered below, a wrong one by CLI11 with its name
+    // A value that breaks a rule takes one line; wrong usage is pointed to the help.
+    app.failure_message([](const CLI::App* command, const CLI::Error& error) {
+        const bool is_value = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ValidationError);
+        return is_value ? std::string(error.what()) + '\n' : CLI::FailureMessage::simple(command, error);
+    });
     app.footer("Exit codes: 0 good, 1 the check or test failed, 2 wrong usage or bad input.");
 
     cli::Command::Run run;

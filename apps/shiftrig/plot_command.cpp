@@ -10,6 +10,7 @@
 
 #include "analysis/load_run.h"
 #include "analysis/plot.h"
+#include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/command.h"
 
 namespace shiftrig::cli {
@@ -80,13 +81,11 @@ Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<Options>();
     app.add_option("RECORDING", options->recording, "of shiftrig run --record")->required();
     app.add_option("-o,--output", options->output, "picture, .svg or .png")->required();
-    app.add_option("--shift", options->shift, "which shift of the recording, from 1")
-        ->check(CLI::PositiveNumber)
+    add_number(app, "--shift", options->shift, {1, 1e6}, "which shift of the recording, from 1")
         ->capture_default_str();
-    app.add_option("--from", options->from, "instead of a shift: from this time on [s]")
-        ->check(CLI::NonNegativeNumber);
-    app.add_option("--until", options->until, "until this time [s]")->check(CLI::NonNegativeNumber);
-    app.add_option("--width", options->width, "[px]")->check(CLI::Range(300, 4000))->capture_default_str();
+    add_number(app, "--from", options->from, {0, longest_s}, "instead of a shift: from this time on [s]");
+    add_number(app, "--until", options->until, {0, longest_s}, "until this time [s]");
+    add_number(app, "--width", options->width, {300, 4000}, "[px]")->capture_default_str();
     return [options] { return run(*options); };
 }
 

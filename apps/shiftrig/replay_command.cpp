@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/command.h"
 #include "io/recording/candump.h"
 #include "io/recording/csv.h"
@@ -129,15 +130,11 @@ io::FieldRecording read_field(const Options& options, const io::ModelFile& file)
 
 // An input that nobody measured: `environment.draft=1`.
 void hold_input(const std::string& held, io::FieldRecording& recording) {
-    const auto equals = held.find('=');
-    char* end = nullptr;
-    const double value = equals == std::string::npos ? 0 : std::strtod(held.c_str() + equals + 1, &end);
-    if (!end || *end != '\0' || end == held.c_str() + equals + 1)
-        throw io::InputError("--hold " + held + ": write INPUT=VALUE, as environment.draft=1");
+    const auto [name, value] = named_number("--hold", held);
     io::FieldColumn column;
-    column.written = column.signal = held.substr(0, equals);
+    column.written = column.signal = name;
     if (const auto* unit = io::unit_spelling(column.written)) {
-        column.signal = column.written.substr(0, equals - unit->suffix.size());
+        column.signal = column.written.substr(0, name.size() - unit->suffix.size());
         column.factor = unit->factor;
     }
     column.value.assign(recording.time.size(), value * column.factor);
@@ -150,11 +147,9 @@ int run_field(const Options& options) {
     io::ModelFile file = io::read_model(options.model);
     io::FieldRecording recording = read_field(options, file);
     for (const auto& held : options.held) hold_input(held, recording);
-    for (const auto& option : options.options) {
-        const auto equals = option.find('=');
-        if (equals == std::string::npos)
-            throw io::InputError("--option " + option + ": write GEAR=OPTION, as range=M");
-        io::select_option(file.description, option.substr(0, equals), option.substr(equals + 1));
+    for (const auto& text : options.options) {
+        const auto [gear, option] = named_word("--option", text);
+        io::select_option(file.description, gear, option);
     }
     plant::BuildOptions build;
     build.step_size = options.step_s;
@@ -200,9 +195,8 @@ Command::Run declare(CLI::App& app) {
     app.add_option("RECORDING", options->recording,
                    "what `shiftrig run --record` wrote, or a real machine's data (.csv, candump log)")
         ->required();
-    app.add_option("--tolerance", options->tolerance,
-                   "agree where |replayed - recorded| <= tolerance * max(1, |recorded|); 0: bit for bit")
-        ->check(CLI::NonNegativeNumber);
+    add_number(app, "--tolerance", options->tolerance, {0, 1e6},
+               "agree where |replayed - recorded| <= tolerance * max(1, |recorded|); 0: bit for bit");
     app.add_option("--model", options->model,
                    "another model under the same inputs: what would it have done?");
     auto* field = app.add_option_group("field recordings (.csv, candump)");
@@ -210,8 +204,7 @@ Command::Run declare(CLI::App& app) {
     field->add_option("--option", options->options, "gear option in use: range=M; repeatable");
     field->add_option("--hold", options->held,
                       "an input that was not measured, held: environment.draft=1; repeatable");
-    field->add_option("--step", options->step_s, "step size of the plant [s]")
-        ->check(CLI::PositiveNumber)
+    add_number(*field, "--step", options->step_s, {1e-6, 1}, "step size of the plant [s]")
         ->capture_default_str();
     app.add_flag("--json", options->json, "print one JSON object");
     return [options] { return run(*options); };

@@ -1,30 +1,33 @@
 #include "apps/shiftrig/rig_options.h"
 
 #include <cmath>
+#include <stdexcept>
 
 #include "apps/rig/rehearsal.h"
+#include "apps/shiftrig/arguments.h"
 
 namespace shiftrig::cli {
 
 void RigOptions::add_to(CLI::App& app) {
     app.add_option("MODEL", choices.model, "the machine (YAML); may be left out where a scenario names it");
     app.add_option("--scenario", choices.scenario, "what happens to it (YAML)");
-    app.add_option("--duration", duration_s, "simulated seconds; else the scenario's, else until SIGINT")
-        ->check(CLI::PositiveNumber);
+    add_number(app, "--duration", duration_s, {0, longest_s, true},
+               "simulated seconds; else the scenario's, else until SIGINT");
     add_common_to(app);
 }
 
 void RigOptions::add_common_to(CLI::App& app, const std::string& usual_pace) {
     pace = usual_pace;
-    app.add_option("--rate-hz", choices.rate_hz, "ticks per simulated second")->capture_default_str();
-    app.add_option("--substeps", choices.substeps, "plant steps per tick")->capture_default_str();
+    constexpr double most_ticks = 1e9;
+    add_number(app, "--rate-hz", choices.rate_hz, {1, 1e5}, "ticks per simulated second")
+        ->capture_default_str();
+    add_number(app, "--substeps", choices.substeps, {1, 1000}, "plant steps per tick")->capture_default_str();
     app.add_option("--pace", pace,
                    "wall: by the clock; lockstep: each tick waits for the controller's answer; free: as fast "
                    "as it goes")
         ->check(CLI::IsMember({"wall", "lockstep", "free"}))
         ->capture_default_str();
-    app.add_option("--factor", factor, "wall pace: simulated time per wall time")
-        ->check(CLI::PositiveNumber)
+    add_number(app, "--factor", factor, {0.001, 10'000}, "wall pace: simulated time per wall time")
         ->capture_default_str();
     app.add_option("--bus", choices.buses,
                    "inprocess | can:vcan0 | udpcan:239.74.163.2:43113 | lcm:udpm://239.255.76.67:7667?ttl=0; "
@@ -32,32 +35,29 @@ void RigOptions::add_common_to(CLI::App& app, const std::string& usual_pace) {
     app.add_option("--controller", choices.controller,
                    "builtin[:CALIBRATION] on the in-process bus | none | a command to start");
     app.add_option("--kernel", choices.kernel, "auto | portable | avx2 | avx512")->capture_default_str();
-    app.add_option("--catch-up", catch_up, "wall pace: ticks it may be behind before it skips or aborts")
-        ->check(CLI::NonNegativeNumber)
+    add_number(app, "--catch-up", catch_up, {0, most_ticks},
+               "wall pace: ticks it may be behind before it skips or aborts")
         ->capture_default_str();
     app.add_option("--overrun", overrun, "what happens then")
         ->check(CLI::IsMember({"skip", "abort"}))
         ->capture_default_str();
-    app.add_option("--late-limit", late_limit,
-                   "wall pace: late ticks in a row that are too many; 0: any number will do")
-        ->check(CLI::NonNegativeNumber)
+    add_number(app, "--late-limit", late_limit, {0, most_ticks},
+               "wall pace: late ticks in a row that are too many; 0: any number will do")
         ->capture_default_str();
     app.add_option("--when-late", when_late, "what happens then")
         ->check(CLI::IsMember({"record", "skip", "abort"}))
         ->capture_default_str();
-    app.add_option("--answer-timeout", answer_timeout_s, "lockstep: seconds to wait for an answer")
-        ->check(CLI::PositiveNumber)
+    add_number(app, "--answer-timeout", answer_timeout_s, {0, 3600, true},
+               "lockstep: seconds to wait for an answer")
         ->capture_default_str();
-    app.add_option("--priority", priority, "wall pace: FIFO priority of the plant thread; 0: none")
-        ->check(CLI::Range(0, 99))
+    add_number(app, "--priority", priority, {0, 99}, "wall pace: FIFO priority of the plant thread; 0: none")
         ->capture_default_str();
-    app.add_option("--rehearse", rehearsal,
-                   "wall pace: ticks of the scenario that are lived through before the start, so that what "
-                   "is built when a "
-                   "mode is first met is there; 0: none")
-        ->check(CLI::NonNegativeNumber)
+    add_number(app, "--rehearse", rehearsal, {0, most_ticks},
+               "wall pace: ticks of the scenario that are lived through before the start, so that what is "
+               "built when a mode is first met is there; 0: none")
         ->capture_default_str();
-    app.add_option("--cpu", processors, "processors the plant thread may run on");
+    add_number(app, "--cpu", processors, {0, rt::most_processors - 1},
+               "processors the plant thread may run on");
 }
 
 rt::Pace RigOptions::pacing() const {
@@ -78,6 +78,7 @@ rt::LoopSettings RigOptions::loop(const rig::Setup& setup) const {
     settings.answer_timeout = std::llround(answer_timeout_s * 1e9);
     const double duration = duration_s.value_or(setup.scenario ? setup.scenario->duration : 0);
     if (duration > 0) settings.slots = std::llround(duration * 1e9 / static_cast<double>(setup.tick_ns));
+    if (settings.slots == 0) throw std::invalid_argument("--duration: less than half a tick");
     return settings;
 }
 

@@ -3,6 +3,7 @@
 #include <memory>
 #include <thread>
 
+#include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/loop_report.h"
 #include "rt/loop.h"
@@ -108,16 +109,14 @@ int run(const Options& options) {
 
 Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<Options>();
-    app.add_option("--rate-hz", options->rate_hz, "rate of the measured loop")
-        ->check(CLI::Range(1.0, 100'000.0))
+    add_number(app, "--rate-hz", options->rate_hz, {1, 1e5}, "rate of the measured loop")
         ->capture_default_str();
-    app.add_option("--duration", options->duration_s, "how long to measure [s]")
-        ->check(CLI::Range(0.01, 86'400.0))
+    add_number(app, "--duration", options->duration_s, {0.01, 86'400}, "how long to measure [s]")
         ->capture_default_str();
-    app.add_option("--priority", options->priority, "FIFO priority, 0: none")
-        ->check(CLI::Range(0, 99))
+    add_number(app, "--priority", options->priority, {0, 99}, "FIFO priority, 0: none")
         ->capture_default_str();
-    app.add_option("--cpu,--processor", options->processors, "processors the loop may run on");
+    add_number(app, "--cpu,--processor", options->processors, {0, rt::most_processors - 1},
+               "processors the loop may run on");
     app.add_flag("!--no-measurement", options->measure, "only examine");
     app.add_flag("--json", options->json, "for programs");
     return [options] { return run(*options); };

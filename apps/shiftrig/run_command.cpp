@@ -13,6 +13,7 @@
 #include "analysis/scorecard.h"
 #include "apps/rig/session.h"
 #include "apps/rig/snapshot.h"
+#include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/certificate_report.h"
 #include "apps/shiftrig/child.h"
 #include "apps/shiftrig/command.h"
@@ -81,6 +82,15 @@ class SignalsStop {
     }
     ~SignalsStop() { running = nullptr; }
 };
+
+// Gives the controller its time, unless the run is over before it began.
+void get_ready(const RunOptions& options, const rt::LoopControl& control) {
+    using Clock = std::chrono::steady_clock;
+    const auto begin = Clock::now() + std::chrono::duration<double>(options.controller_start_s);
+    while (Clock::now() < begin && !control.stopping())
+        std::this_thread::sleep_for(
+            std::min<std::chrono::duration<double>>(begin - Clock::now(), std::chrono::milliseconds(20)));
+}
 
 // What the session needs beside the rig, and what is left of it afterwards.
 struct Beside {
@@ -246,12 +256,12 @@ int run(const RunOptions& options) {
     const double dissipated_before = dissipated(rig);
 
     std::optional<Child> controller;
-    if (const auto command = rig::controller_command(options.choices); !command.empty()) {
-        controller.emplace(command);
-        std::this_thread::sleep_for(std::chrono::duration<double>(options.controller_start_s));
-    }
     {
         const SignalsStop signals_stop(session.control());
+        if (const auto command = rig::controller_command(options.choices); !command.empty()) {
+            controller.emplace(command);
+            get_ready(options, session.control());
+        }
         run_loop(session, options, live, controller ? &*controller : nullptr, unanswered);
     }
     controller.reset();
@@ -288,16 +298,16 @@ Command::Run declare(CLI::App& app) {
     options->add_to(app);
     app.add_option("--record", options->record, "recording (an LCM log; .zst compresses)");
     app.add_option("--csv", options->csv, "every signal of every tick");
-    app.add_option("--snapshot-at", options->snapshot_at, "copy the rig at this time [s] into this file");
+    app.add_option("--snapshot-at", options->snapshot_at, "copy the rig at this time [s] into this file")
+        ->check(obeys({0, longest_s}, false).application_index(0));
     app.add_option("--from", options->from,
                    "go on from a snapshot; --duration counts from the start of its run");
     app.add_option("--can-log", options->choices.can_log, "candump log of everything on the first CAN bus");
     app.add_option("--can-replay", options->choices.can_replay,
                    "candump log that takes the controller's place, at its own times");
     app.add_option("--trace", options->trace, "what the loop did when, for ui.perfetto.dev");
-    app.add_option("--controller-start", options->controller_start_s,
-                   "seconds a command given as --controller has to get ready")
-        ->check(CLI::NonNegativeNumber)
+    add_number(app, "--controller-start", options->controller_start_s, {0, 3600},
+               "seconds a command given as --controller has to get ready")
         ->capture_default_str();
     app.add_flag("--json", options->json, "end with one JSON object on standard output");
     return [options] { return run(*options); };

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "apps/serve/dashboard.h"
+#include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/child.h"
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/loop_report.h"
@@ -32,7 +33,9 @@ int run(const Options& options) {
     choices.lockstep = options.pacing() == rt::Pace::lockstep;
     rig::Rig rig(rig::make_setup(choices));
     for (const auto& warning : rig.buses().warnings()) std::cerr << warning << '\n';
+    pthread_sigmask(SIG_UNBLOCK, &ends, nullptr);  // nothing is lost yet: either signal may end it as usual
     rehearse(options, rig);
+    pthread_sigmask(SIG_BLOCK, &ends, nullptr);
 
     serve::DashboardOptions dashboard_options;
     dashboard_options.http = options.http;
@@ -73,9 +76,7 @@ Command::Run declare(CLI::App& app) {
     options->add_to(app);
     app.add_option("--address", options->http.address, "to listen on; any but loopback needs a --token")
         ->capture_default_str();
-    app.add_option("--port", options->http.port, "0: any free one")
-        ->check(CLI::Range(0, 65535))
-        ->capture_default_str();
+    add_number(app, "--port", options->http.port, {0, 65535}, "0: any free one")->capture_default_str();
     app.add_option("--token", options->http.token, "that every request must carry (?token=…)");
     app.add_option("--record", options->record,
                    "record from the start, to this file (recordings begun from the page go there too)");

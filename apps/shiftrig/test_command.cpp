@@ -18,6 +18,7 @@
 #include "analysis/junit.h"
 #include "apps/rig/collector.h"
 #include "apps/rig/session.h"
+#include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/child.h"
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/rig_options.h"
@@ -197,9 +198,8 @@ Command::Run declare(CLI::App& app) {
     options->add_common_to(app, "free");
     app.add_option("SCENARIO", options->scenarios, "scenario files with expectations (YAML)")->required();
     app.add_option("--junit", options->junit, "results as JUnit XML");
-    app.add_option("--jobs", options->jobs,
-                   "scenarios side by side; one at a time on a bus outside the process")
-        ->check(CLI::Range(1, 1024))
+    add_number(app, "--jobs", options->jobs, {1, 1024},
+               "scenarios side by side; one at a time on a bus outside the process")
         ->capture_default_str();
     app.add_option("--limits", options->limits,
                    "of the scorecard (YAML); else config/limits.yaml as built in");

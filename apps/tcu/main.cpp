@@ -29,7 +29,11 @@ int main(int argc, char** argv) {
     app.add_flag("--lockstep", lockstep,
                  "count time by the rig's questions, as fast as they come (the rig: --pace lockstep)");
     app.footer("Ends with SIGINT or SIGTERM. Exit codes: 0 good, 2 wrong usage or bad input.");
-    CLI11_PARSE(app, argc, argv);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    }
 
     std::signal(SIGINT, on_signal);
     std::signal(SIGTERM, on_signal);

@@ -211,21 +211,29 @@ def sensitivity(tables):
     for r in rows:
         if r["estimate"] != "none" and r["estimate"] not in names:
             names.append(r["estimate"])
-    figure, axes = plt.subplots(1, 4, figsize=(9, 3.2), sharey=True)
+    figure, axes = plt.subplots(1, 4, figsize=(9, 6.2), sharey=True)
     for axis, (metric, title) in zip(axes, metrics):
+        changes = {}
         for case, colour, offset in (("good", BLUE, 0.15), ("bad", ORANGE, -0.15)):
             base = next(r[metric] for r in rows if r["case"] == case and r["estimate"] == "none")
             for i, name in enumerate(reversed(names)):
                 low, high = (next(r[metric] for r in rows if r["case"] == case and r["estimate"] == name and r["factor"] == f) for f in (0.7, 1.3))
-                axis.plot([100 * (low / base - 1), 100 * (high / base - 1)], [i + offset] * 2, "-", color=colour, linewidth=3)
-                axis.plot(100 * (low / base - 1), i + offset, "|", color="black", markersize=6)
+                changes[i + offset] = [100 * (value / base - 1) for value in (low, high)], colour
+        # What leaves the frame is named at its edge: one estimate must not flatten all others.
+        edge = 25
+        for y, ((low, high), colour) in changes.items():
+            axis.plot([max(-edge, min(edge, low)), max(-edge, min(edge, high))], [y, y], "-", color=colour, linewidth=3)
+            if abs(low) > edge:
+                axis.text(edge, y, f"−30 %: {low:+.0f} % ", ha="right", va="bottom", fontsize=7)
+            else:
+                axis.plot(low, y, "|", color="black", markersize=6)
         axis.axvline(0, color=GREY, linewidth=0.8)
-        axis.set(title=title, xlabel="change [%]")
+        axis.set(title=title, xlabel="change [%]", xlim=(-edge, edge))
     axes[0].set_yticks(range(len(names)), list(reversed(names)))
     axes[3].plot([], [], color=BLUE, linewidth=3, label="good")
     axes[3].plot([], [], color=ORANGE, linewidth=3, label="bad")
     axes[3].plot([], [], "|", color="black", label="−30 %")
-    axes[3].legend(fontsize=8)
+    axes[3].legend(fontsize=8, loc=(0.55, 0.3))
     return figure
 
 

@@ -9,8 +9,11 @@
 
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <ctime>
+
+#include "io/number.h"
 
 namespace shiftrig::io::lcm {
 
@@ -53,6 +56,13 @@ Address parse(const std::string& url) {
             throw EndpointError("lcm:" + url + ": \"" + network.substr(port_colon + 1) +
                                 "\" is not a port (1 to 65535)");
         address.port = static_cast<int>(port);
+    }
+    // LCM takes what is no number for the default, says so in a line without the URL and goes on.
+    if (const auto option = url.find("ttl="); option != std::string::npos) {
+        const std::string ttl = url.substr(option + 4, url.find('&', option) - option - 4);
+        const auto hops = finite_number(ttl);
+        if (!hops || *hops < 0 || *hops > 255 || *hops != std::floor(*hops))
+            throw EndpointError("lcm:" + url + ": \"" + ttl + "\" is not a ttl (0 to 255)");
     }
     return address;
 }

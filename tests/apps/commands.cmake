@@ -17,3 +17,9 @@ add_executable(article_test ${CMAKE_CURRENT_LIST_DIR}/article_test.cpp)
 target_compile_definitions(article_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
 target_link_libraries(article_test PRIVATE shiftrig_rig GTest::gtest_main)
 gtest_discover_tests(article_test)
+
+if(SHIFTRIG_BENCH)
+  set(SOAK $<TARGET_FILE:shiftrig_soak>)
+endif()
+add_test(NAME numbers_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/numbers_test.py
+  $<TARGET_FILE:shiftrig> ${CMAKE_SOURCE_DIR}/config ${SOAK})

@@ -15,6 +15,7 @@ import unittest
 
 SHIFTRIG, TCU, CONFIG = sys.argv[1:4]
 SHIFT = CONFIG + "/scenarios/plough_upshift.yaml"
+MULTICAST = os.path.dirname(os.path.abspath(__file__)) + "/../io/with_multicast.sh"
 
 
 def run(*arguments, program=SHIFTRIG, prefix=(), **options):
@@ -86,6 +87,7 @@ class BadInput(InAFolder):
             (("--bus", "carrier:pigeon"), "carrier:pigeon: unknown kind"),
             (("--kernel", "abacus"), "abacus"),
             (("--rate-hz", "0"), "--rate-hz"),
+            (("--duration", "1e-7"), "--duration: less than half a tick"),
             (("--controller", "builtin:nosuch.yaml"), "nosuch.yaml"),
             (("--can-replay", "nosuch.log"), "nosuch.log"),
             (("--bus", "inprocess", "--bus", "inprocess"), "only once"),
@@ -139,7 +141,8 @@ class Results(InAFolder):
         self.assertEqual(certificate["ticks"],
                          {"tie_up": 0, "direction_search_gave_up": 0, "not_finite": 0, "coarse": None})  # steps are taken whole
         text = run("--scenario", SHIFT, "--pace", "free").stdout
-        self.assertRegex(text, r"plant +\d+ events, 0 fall-backs, \d+ modes built; torque residual \d")
+        self.assertIn("plant     %(events)d events, 0 fall-backs, %(mode_lookups)d mode look-ups, %(modes_built)d modes built; "
+                      "torque residual " % certificate, text)
         self.assertNotIn("of 6000 ticks", text)
 
     def test_the_energy_of_the_certificate_is_that_of_this_run(self):
@@ -235,6 +238,42 @@ class Results(InAFolder):
         replayed = subprocess.run([SHIFTRIG, "replay", recording, "--json"], stdout=subprocess.PIPE, text=True)
         self.assertEqual(replayed.returncode, 0)
         self.assertEqual(json.loads(replayed.stdout)["ticks"], result["ticks"])
+
+    def stopped(self, *arguments, after):
+        """SIGTERM once `after()` holds; the result, and the seconds that the program still took."""
+        process = subprocess.Popen([MULTICAST, SHIFTRIG, "run", "--scenario", SHIFT, "--json", *arguments],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.kill)
+        while not after():
+            self.assertIsNone(process.poll())
+            time.sleep(0.05)
+        time.sleep(0.5)
+        asked = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=60)
+        took = time.monotonic() - asked
+        self.assertEqual(process.returncode, 0, err)
+        result = json.loads(out.splitlines()[-1])
+        self.assertEqual(result["loop"]["outcome"], "stopped")
+        return result, took
+
+    def test_sigterm_ends_a_run_in_any_pace_whatever_it_waits_for(self):
+        recording = self.path("cut.lcmlog")
+        recorded = lambda: os.path.exists(recording) and os.path.getsize(recording) > 0
+        for arguments, ticks in (
+                (("--pace", "wall", "--rate-hz", "1", "--factor", "0.001"), 1),  # sleeps 1000 s
+                (("--pace", "lockstep", "--bus", "udpcan:239.74.163.2:43113", "--answer-timeout", "3600"), 10),  # a command cycle
+                (("--pace", "free", "--duration", "1e9"), None),
+                (("--pace", "wall", "--controller", "sleep 1000", "--bus", "inprocess", "--controller-start", "3600"), 0)):
+            with self.subTest(arguments):
+                result, took = self.stopped(*arguments, "--record", recording, after=recorded)
+                self.assertLess(took, 5 if ticks is None else 2)  # the ticks of a free run are judged, too
+                if ticks is not None:
+                    self.assertLessEqual(result["ticks"], ticks)
+                replayed = subprocess.run([SHIFTRIG, "replay", recording, "--json"], stdout=subprocess.PIPE, text=True)
+                self.assertEqual(replayed.returncode, 0)
+                self.assertEqual(json.loads(replayed.stdout)["ticks"], result["ticks"])
+                os.remove(recording)
 
     def test_controller_that_ends_is_told_and_the_safe_command_acts(self):
         done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "exit 3", "--pace", "wall", "--factor", "4",

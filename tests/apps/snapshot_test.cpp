@@ -151,7 +151,9 @@ TEST(Variation, IsReadAsWritten) {
     EXPECT_DOUBLE_EQ(around.low, 0.9);
     EXPECT_DOUBLE_EQ(around.high, 1.1);
     EXPECT_THROW(parse_variation("clutch.F3.leak"), io::InputError);
-    EXPECT_THROW(parse_variation("clutch.F3.leak=a"), io::InputError);
+    for (const char* wrong : {"a", "nan", "1:inf", "1:1e400", "1:2:nan", "1:2:2.5", "1:2:1", "-1e308:1e308",
+                              "+-nan%", "+--5%", "+-0%"})
+        EXPECT_THROW(parse_variation(std::string("clutch.F3.leak=") + wrong), io::InputError) << wrong;
 }
 
 }  // namespace

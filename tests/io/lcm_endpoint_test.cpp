@@ -60,6 +60,13 @@ TEST(Endpoint, PortOutOfRangeIsRefused) {
               "lcm:udpm://239.255.76.67:70000: \"70000\" is not a port (1 to 65535)");
 }
 
+TEST(Endpoint, TtlThatIsNoneIsRefused) {
+    for (const std::string wrong : {"nan", "-5", "256", "1.5", ""})
+        EXPECT_EQ(
+            error_of("udpm://239.255.76.67:7667?ttl=" + wrong),
+            "lcm:udpm://239.255.76.67:7667?ttl=" + wrong + ": \"" + wrong + "\" is not a ttl (0 to 255)");
+}
+
 TEST(Endpoint, UnicastAddressIsRefused) {
     EXPECT_EQ(
         error_of("udpm://127.0.0.1:7667"),

@@ -177,6 +177,16 @@ TEST(ModelFile, ThePartOfAnotherReaderIsHandedThrough) {
 
 // ---- what is wrong -----------------------------------------------------------------------------------
 
+TEST(ModelFile, TheWorkOfAStepIsBounded) {
+    EXPECT_EQ(refusal(two_masses + "maximum_events: 64\nmaximum_parts: 256\n"), "");
+    EXPECT_EQ(refusal(two_masses + "maximum_events: 100000000\n"),
+              "m.yaml:5:1: maximum_events = 100000000; must be within 1 and 64");
+    EXPECT_EQ(refusal(two_masses + "maximum_parts: 257\n"),
+              "m.yaml:5:1: maximum_parts = 257; must be within 1 and 256");
+    EXPECT_EQ(refusal(two_masses + "maximum_events: 0\n"),
+              "m.yaml:5:1: maximum_events = 0; must be within 1 and 64");
+}
+
 TEST(ModelFile, AWrongValueIsNamedWithPlaceDeviceKeyValueAndRule) {
     EXPECT_EQ(refusal(replaced(two_masses, "inertia_kg_m2: 1}", "inertia_kg_m2: -2.6}")),
               "m.yaml:3:10: mass \"left\": inertia_kg_m2 = -2.6; must be > 0");

@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "io/number.h"
 #include "tests/plant/comparison.h"
 #include "tests/plant/random_forests.h"
 
@@ -70,7 +71,7 @@ bool parse(int argc, char** argv, Arguments& a) {
         else if (key == "--seeds")
             a.seeds = numbers(value);
         else if (key == "--seconds")
-            a.options.seconds = std::atof(value);
+            a.options.seconds = io::finite_number(value).value_or(0);
         else if (key == "--substeps")
             a.options.steps_per_sample = std::atoi(value);
         else if (key == "--jobs")
@@ -95,7 +96,8 @@ bool parse(int argc, char** argv, Arguments& a) {
             return false;
     }
     if (!a.seeds.empty()) a.count = static_cast<long>(a.seeds.size());
-    return a.count > 0 && a.jobs > 0 && a.options.seconds > 0.01;
+    return a.count > 0 && a.jobs > 0 && a.jobs <= 1024 && a.options.seconds > 0.01 &&
+           a.options.seconds <= 1e6 && a.options.steps_per_sample > 0 && a.options.steps_per_sample <= 1000;
 }
 
 }  // namespace

@@ -45,41 +45,38 @@ TEST_P(TractorShift, KeepsItsOrderAcrossEvents) {
     EXPECT_GT(std::log2(coarse / fine) / 3, 2.5) << coarse << " → " << fine;
 }
 
-// The article's rule moves every change to the end of its step: order 1, and a hundred times the error.
+// The article's rule moves every change to the end of its step: order 1. How far before it a change lies is chance: the mean
+// over machines whose clutches differ a little, and with them the instants. With good timing hardly anything jumps: a pair
+// that locks late by δ is a matter of δ² (what friction does too much the join takes back), and the few per cent that
+// torque falls as F2 breaks away show below that only at short steps.
 TEST_P(TractorShift, NextStepRuleShowsItsOwnOrder) {
-    const auto next_step = [](plant::Description& d) { d.transition = plant::Transition::next_step; };
-    // How far before its step's end a change lies is chance: a line through several steps, not two points.
-    double x = 0, y = 0, xx = 0, xy = 0;
-    const std::vector<int> steps = {1, 2, 4, 8, 16};
-    for (const int n : steps) {
-        const double log_h = -std::log2(n);
-        const double log_error =
-            std::log2(error(run_plant(cases::tractor_shift(GetParam()), n, next_step), truth()).worst);
-        x += log_h;
-        y += log_error;
-        xx += log_h * log_h;
-        xy += log_h * log_error;
+    constexpr int coarse = 2, fine = 8, machines = 40;
+    double coarse_error = 0, fine_error = 0;
+    for (int k = 0; k < machines; ++k) {
+        const auto run = [k](int steps, plant::Transition transition) {
+            return run_plant(cases::tractor_shift(GetParam()), steps, [=](plant::Description& d) {
+                d.transition = transition;
+                for (plant::Clutch& clutch : d.clutches)
+                    if (auto* plates = std::get_if<plant::WetPlates>(&clutch.friction))
+                        plates->piston_area *= 1 + 0.05 * k / machines;
+            });
+        };
+        const ShiftTrace exact = run(16, plant::Transition::localised);
+        coarse_error += error(run(coarse, plant::Transition::next_step), exact).worst / machines;
+        fine_error += error(run(fine, plant::Transition::next_step), exact).worst / machines;
     }
-    const auto count = static_cast<double>(steps.size());
-    const double order = (count * xy - x * y) / (count * xx - x * x);
-    EXPECT_GT(order, 0.6);
-    EXPECT_LT(order, 2.0);  // 1.0 to 1.6: chance again; localised, it is above 2.5
+    const double order = std::log2(coarse_error / fine_error) / 2;
+    const bool jumps = GetParam() != cases::Shift::good;
+    // Reached: 1.58 with good timing, 0.86 and 1.07 where torques jump; localised, it is above 2.5.
+    EXPECT_GT(order, jumps ? 0.8 : 1.3) << coarse_error << " → " << fine_error;
+    EXPECT_LT(order, jumps ? 1.3 : 1.9) << coarse_error << " → " << fine_error;
 }
 
 // A piston that fills: the chamber's pressure jumps where it arrives, inside a step.
 TEST_P(TractorShift, KeepsItsOrderWhilePistonsFill) {
-    const auto with_pistons = [](plant::Description& d) {
-        for (plant::Clutch& clutch : d.clutches) {
-            auto* valve = std::get_if<plant::ActuationHydraulic>(&clutch.actuation);
-            if (valve == nullptr) continue;
-            valve->preload_pressure = 0.8e5;
-            valve->stroke = 2e-3;
-            valve->fill_volume = 30e-6;
-            valve->fill_flow = 20e-3 / 60;
-        }
-    };
     const auto run = [&](int steps) {
-        return run_plant(cases::tractor_shift(GetParam()), steps, with_pistons);
+        return run_plant(cases::tractor_shift(GetParam()), steps,
+                         [](plant::Description& d) { cases::add_pistons(d); });
     };
     const ShiftTrace converged = run(32);
     EXPECT_GT(error(converged, truth()).worst, 1e-2) << "the fill delays F3";

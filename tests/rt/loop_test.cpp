@@ -7,8 +7,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
+#include <stdexcept>
+#include <thread>
 #include <vector>
 
 namespace shiftrig::rt {
@@ -364,6 +368,77 @@ TEST(Loop, LockstepAsksForTheAnswerToEverySlotAndCountsTheMissing) {
     EXPECT_EQ(loop.report().unanswered, 1);
     EXPECT_FALSE(answered[4]);
     EXPECT_TRUE(answered[5]);
+}
+
+TEST(Loop, FactorThatIsNoneIsRefused) {
+    Script script;
+    for (const double factor : {std::nan(""), std::numeric_limits<double>::infinity(), 0., -1.}) {
+        LoopSettings settings = ten_slots();
+        settings.factor = factor;
+        EXPECT_THROW(Loop<ScriptedClock>(settings, ScriptedClock{&script}), std::invalid_argument) << factor;
+    }
+}
+
+TEST(Loop, SleepsLongWaitsInPiecesSoThatItHearsAStop) {
+    Script script;
+    LoopSettings settings = ten_slots();
+    settings.period = 600 * ms;
+    settings.slots = 3;
+    const Played played = play(script, settings);
+    EXPECT_EQ(script.sleeps, (Slots{250 * ms, 500 * ms, 600 * ms, 850 * ms, 1100 * ms, 1200 * ms}));
+    EXPECT_EQ(played.report.executed, 3);
+    EXPECT_EQ(played.report.wake_up.count(), 2);  // a wait is one, however many pieces it took
+    EXPECT_EQ(played.report.late, 0);
+}
+
+TEST(Loop, LongWaitsForAnAnswerArePiecesTooAndEndWithAStop) {
+    Script script;
+    LoopSettings settings = ten_slots();
+    settings.pace = Pace::lockstep;
+    settings.answer_timeout = 3'600'000 * ms;
+    Loop<ScriptedClock> loop(settings, ScriptedClock{&script});
+    std::int64_t asked = 0;
+    loop.run([](const Tick&) {},
+             [&](std::int64_t timeout) {
+                 EXPECT_EQ(timeout, 250 * ms);
+                 script.time += timeout;
+                 if (++asked == 5) loop.control().stop();
+                 return false;
+             });
+    EXPECT_EQ(asked, 5);
+    EXPECT_EQ(loop.report().outcome, Outcome::stopped);
+    EXPECT_EQ(loop.report().executed, 1);
+    EXPECT_EQ(loop.report().unanswered, 0);
+}
+
+TEST(Loop, StopEndsTheCountingOfSkippedSlots) {
+    Script script;
+    LoopSettings settings = ten_slots();
+    settings.slots = std::numeric_limits<std::int64_t>::max();
+    settings.factor = 1e4;
+    script.step_time[0] = 86'400'000 * ms;  // a day: 10¹² slots
+    Loop<ScriptedClock> loop(settings, ScriptedClock{&script});
+    std::thread stopper([&] {
+        usleep(50'000);
+        loop.control().stop();
+    });
+    loop.run([&](const Tick& tick) { script.time += script.step_time[tick.slot]; });
+    stopper.join();
+    EXPECT_EQ(loop.report().outcome, Outcome::stopped);
+    EXPECT_EQ(loop.report().executed, 1);
+    EXPECT_LT(loop.report().skipped, 864'000'000'000);
+}
+
+TEST(Loop, WhoeverHasNobodyToWaitForIsAskedOnce) {
+    Script script;
+    LoopSettings settings = ten_slots();
+    settings.pace = Pace::lockstep;
+    settings.answer_timeout = 3'600'000 * ms;
+    Loop<ScriptedClock> loop(settings, ScriptedClock{&script});
+    std::int64_t asked = 0;
+    loop.run([](const Tick&) {}, [&](std::int64_t) { return ++asked < 0; });
+    EXPECT_EQ(asked, 9);
+    EXPECT_EQ(loop.report().unanswered, 9);
 }
 
 // ---- a real process, really stopped ------------------------------------------------------------------

@@ -28,20 +28,20 @@ Clutch powershift_clutch(const char* name, const char* pinion, const Estimates& 
     plates.outer_radius = 0.110;
     plates.inner_radius = 0.085;
     plates.piston_area = 0.0150;
-    plates.return_pressure = 1.2 * bar;
-    plates.mu_static = 0.13;
-    plates.mu_sliding = 0.10;
+    plates.return_pressure = 1.2 * bar * estimates.return_spring;
+    plates.mu_static = 0.13 * estimates.friction;
+    plates.mu_sliding = 0.10 * estimates.friction;
     plates.mu_rise = 0.025 * estimates.friction_rise;
-    plates.mu_speed = 0.3;
+    plates.mu_speed = 0.3 * estimates.friction_speed;
     plates.clearance = 0.25e-3;
     clutch.friction = plates;
     ActuationHydraulic hydraulic;
     hydraulic.dead_time = 0.015 * estimates.dead_time;
     hydraulic.natural_frequency = 60 * estimates.valve_frequency;
-    hydraulic.damping_ratio = 0.8;
-    hydraulic.slew = 150 * bar;
+    hydraulic.damping_ratio = 0.8 * estimates.valve_damping;
+    hydraulic.slew = 150 * bar * estimates.slew;
     hydraulic.maximum_pressure = 18 * bar;
-    hydraulic.preload_pressure = 0.8 * bar;
+    hydraulic.preload_pressure = 0.8 * bar * estimates.preload;
     clutch.actuation = hydraulic;
     return clutch;
 }
@@ -151,14 +151,16 @@ TractorShift tractor_shift(Shift shift, const Estimates& estimates) {
     const auto rotating = [&](const char* name, double inertia) {
         d.masses.push_back({.name = name, .inertia = inertia});
     };
-    rotating("engine", 2.6);
-    rotating("clutch_disc", 0.15);
-    rotating("input", 0.30);
-    for (const char* pinion : {"pinion_1", "pinion_2", "pinion_3", "pinion_4"}) rotating(pinion, 0.02);
-    rotating("output", 0.25);
-    rotating("range_output", 0.05);
-    rotating("crown", 1.0);
-    rotating("axle_input", 5.0);
+    const double others = estimates.other_inertias;
+    rotating("engine", 2.6 * estimates.engine_inertia);
+    rotating("clutch_disc", 0.15 * others);
+    rotating("input", 0.30 * others);
+    for (const char* pinion : {"pinion_1", "pinion_2", "pinion_3", "pinion_4"})
+        rotating(pinion, 0.02 * others);
+    rotating("output", 0.25 * others);
+    rotating("range_output", 0.05 * others);
+    rotating("crown", 1.0 * others);
+    rotating("axle_input", 5.0 * others);
     rotating("wheels", 550 * estimates.wheel_inertia);
     d.masses.push_back({.name = "vehicle", .inertia = 14000, .motion = Motion::translating});
     const double k = estimates.shaft_stiffness, c = estimates.shaft_damping;
@@ -175,7 +177,7 @@ TractorShift tractor_shift(Shift shift, const Estimates& estimates) {
     main.a = "engine";
     main.b = "clutch_disc";
     DryFriction dry;
-    dry.sliding_capacity = shift == Shift::bad_coulomb ? 0.75 * 2400 : 2400;
+    dry.sliding_capacity = (shift == Shift::bad_coulomb ? 0.75 * 2400 : 2400) * estimates.main_capacity;
     dry.static_ratio = 1.15;
     main.friction = dry;
     main.actuation = ActuationConstant{};
@@ -188,7 +190,7 @@ TractorShift tractor_shift(Shift shift, const Estimates& estimates) {
         g.a = a;
         g.b = b;
         g.ratio = u;
-        g.efficiency = eta;
+        g.efficiency = 1 - (1 - eta) * estimates.gear_losses;
         d.gears.push_back(g);
     };
     gear("P1", "pinion_1", "output", 41.0 / 30, 0.98);
@@ -249,9 +251,9 @@ TractorShift tractor_shift(Shift shift, const Estimates& estimates) {
     engine.high_idle = 2191 * rpm;
     engine.friction_constant = 70;
     engine.friction_per_speed = 0.45;
-    engine.actuator_lag = 0.04;
-    engine.turbo_instant_fraction = 0.62;
-    engine.turbo_lag = 0.5;
+    engine.actuator_lag = 0.04 * estimates.engine_lag;
+    engine.turbo_instant_fraction = 0.62 * estimates.turbo_instant;
+    engine.turbo_lag = 0.5 * estimates.turbo_lag;
     engine.fade_from = 700 * rpm;
     engine.fade_to = 500 * rpm;
     engine.stall_speed = 400 * rpm;
@@ -274,6 +276,16 @@ TractorShift tractor_shift(Shift shift, const Estimates& estimates) {
     else
         result.start_speeds.emplace_back("vehicle", 1800 * rpm / overall * wheel_radius * (1 - 0.074));
     return result;
+}
+
+void add_pistons(Description& description, const Estimates& estimates) {
+    for (Clutch& clutch : description.clutches) {
+        auto* valve = std::get_if<ActuationHydraulic>(&clutch.actuation);
+        if (valve == nullptr) continue;
+        valve->stroke = 2e-3;
+        valve->fill_volume = 30e-6 * estimates.fill_volume;
+        valve->fill_flow = 20e-3 / 60 * estimates.fill_flow;
+    }
 }
 
 reference::System tractor_system(const TractorShift& shift, const Vector& start_speeds) {

@@ -33,11 +33,19 @@ struct TractorShift {
 
 // Factors on the estimates of the machine, for the sensitivity study; 1 each.
 struct Estimates {
-    double shaft_stiffness = 1, shaft_damping = 1, wheel_inertia = 1, tyre_relaxation = 1,
-           valve_frequency = 1, dead_time = 1, friction_rise = 1;
+    double shaft_stiffness = 1, shaft_damping = 1, wheel_inertia = 1, other_inertias = 1, engine_inertia = 1;
+    double engine_lag = 1, turbo_instant = 1, turbo_lag = 1, gear_losses = 1, main_capacity = 1;
+    double friction = 1, friction_rise = 1,
+           friction_speed = 1;  // μ static and sliding; its rise; over this speed
+    double dead_time = 1, valve_frequency = 1, valve_damping = 1, slew = 1;
+    double fill_volume = 1, fill_flow = 1, preload = 1, return_spring = 1;
+    double tyre_relaxation = 1;
 };
 
 TractorShift tractor_shift(Shift shift, const Estimates& estimates = {});
+
+// Gives the powershift clutches the pistons that the machine above does without.
+void add_pistons(plant::Description& description, const Estimates& estimates = {});
 
 // The same machine for the reference solver. Extra states: tyre slip κ (if it has a tyre), engine torque,
 // boost. Its time 0 is the start of the warm-up; start speeds are those of the plant's own start.
