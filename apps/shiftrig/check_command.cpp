@@ -5,6 +5,7 @@
 
 #include "analysis/driveline_dot.h"
 #include "analysis/driveline_svg.h"
+#include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/examination.h"
 #include "io/model_file.h"
@@ -49,7 +50,8 @@ Command::Run declare_check(CLI::App& app) {
         "contradict one another, what a step cannot resolve, and modes that an engine's main order meets");
     app.add_flag("--json", options->json, "print one JSON object");
     app.add_flag("--shapes", options->shapes, "print the mode shapes of every gear and state");
-    app.add_option("--rate-hz", options->rate_hz, "of the run to be: warn of what its steps cannot resolve")
+    add_number(app, "--rate-hz", options->rate_hz, {1, 1e5},
+               "of the run to be: warn of what its steps cannot resolve")
         ->check(CLI::Range(1., 1e5))
         ->capture_default_str();
     app.add_option("--dot", options->dot, "write the driveline as Graphviz text into this file");

@@ -134,19 +134,21 @@ TEST(StaticsCommand, WrongNamesAndNumbersAreOneLineAndCodeTwo) {
 }
 
 TEST(StaticsCommand, NumbersThatAreNoneAreOneLineAndCodeTwo) {
-    const std::vector<std::pair<std::string, std::string>> shown{
-        {"nan", "nan"}, {"1e400", "inf"}, {"inf", "inf"}, {"-1e101", "-1e+101"}};
-    for (const auto& [given, value] : shown) {
-        const std::string rule = " \"input\" = " + value + "; must be finite, at most 1e100 in size\n";
-        Said said = statics({wt, "--closed", "C1,C3", "--input", "input=" + given});
-        EXPECT_EQ(said.exit_code, 2) << given;
-        EXPECT_EQ(said.err, "shiftrig: statics \"WT gearbox\": input" + rule);
+    const auto refused = [](const std::vector<std::string>& arguments, const std::string& line) {
+        const Said said = statics(arguments);
+        EXPECT_EQ(said.exit_code, 2);
+        EXPECT_EQ(said.err, line);
         EXPECT_EQ(said.out, "");
-        said = statics({wt, "--closed", "C1,C3", "--input", "input=1", "--speed", "input=" + given});
-        EXPECT_EQ(said.exit_code, 2) << given;
-        EXPECT_EQ(said.err, "shiftrig: statics \"WT gearbox\": speed" + rule);
-        EXPECT_EQ(said.out, "");
+    };
+    for (const std::string given : {"nan", "1e400", "inf"}) {
+        const std::string rule = ": \"input=" + given + "\": \"" + given + "\" is no finite number\n";
+        refused({wt, "--closed", "C1,C3", "--input", "input=" + given}, "--input" + rule);
+        refused({wt, "--closed", "C1,C3", "--input", "input=1", "--speed", "input=" + given},
+                "--speed" + rule);
     }
+    refused({wt, "--closed", "C1,C3", "--input", "input=-1e101"},
+            "shiftrig: statics \"WT gearbox\": input \"input\" = -1e+101; must be finite, at most 1e100 in "
+            "size\n");
 }
 
 // Gear IV is a direct drive.
