@@ -140,9 +140,11 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
     // Writes one column of a block back in physical variables.
     const auto put = [&](double* panels, int blocks, int block, int width, int c, const double* scaled,
                          double factor) {
-        for (int i = 0; i < stride; ++i) {
-            panels[panel_index(blocks * stride, width, block * stride + i, c)] =
-                i < n ? factor * scaled[i] / sigma[i] : 0;
+        constexpr int four = 4;  // rows that lie side by side in any panel; blocks are whole fours
+        for (int first = 0; first < stride; first += four) {
+            double* const at = panels + panel_index(blocks * stride, width, block * stride + first, c);
+            for (int i = first; i < first + four; ++i)
+                at[i - first] = i < n ? factor * scaled[i] / sigma[i] : 0;
         }
     };
     const auto put_transition = [&](int block) {
