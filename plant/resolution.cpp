@@ -149,7 +149,8 @@ std::string remedy(const Model& model, double omega, double bound) {
     const std::string steps = "take steps of " + milliseconds(bound / omega * parts);
     const std::string damp = " damp it, or make the mass part of its neighbour";
     if (model.description().transition == Transition::next_step) return steps + "," + damp;
-    return steps + format(" or maximum_parts %.0f,", std::exp2(std::ceil(std::log2(omega * h / bound)))) +
+    const double needed = std::exp2(std::ceil(std::log2(omega * h / bound)));
+    return steps + (needed <= Description::most_parts ? format(" or maximum_parts %.0f,", needed) : ",") +
            damp;
 }
 

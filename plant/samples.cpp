@@ -65,6 +65,7 @@ ScratchData::ScratchData(const ModelData& m) {
     const auto bytes = static_cast<std::size_t>(whole_words(m.contact_bytes));
     for (auto* list : {&before, &trial, &release, &changed, &violations}) list->assign(bytes, 0);
     family.assign(bytes, 0);
+    losses.resize(static_cast<std::size_t>(m.meshes));
     overcome.assign(static_cast<std::size_t>(m.pairs), 0);
     const auto longest = static_cast<std::size_t>(
         whole_panels(std::max({3 * m.states_padded, padded(m.torques), 3 * m.forces}) + m.states_padded +

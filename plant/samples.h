@@ -50,6 +50,11 @@ struct Sample {
     double torque_residual = 0;
 };
 
+// What a stuck mesh takes to stay at rest, and the loss it has at its torque if it moves that way [Nm].
+struct LossAtRest {
+    double needed = 0, allowed = 0;
+};
+
 // The course of what presses a pair together, where it changes within the step.
 struct PairLoad {
     StepValues values;  // engagement
@@ -96,6 +101,7 @@ struct ScratchData {
     std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
     std::vector<unsigned char> overcome;  // per pair: broke away in the instant being settled
     std::vector<signed char> family;
+    std::vector<LossAtRest> losses;  // per mesh, for what is told of it
     AlignedDoubles vectors;
     double *vector_a = nullptr, *vector_b = nullptr,
            *vector_c = nullptr;  // padded masses, torques, forces, or three blocks

@@ -77,14 +77,22 @@ double departure(const Work& w, const unsigned char* contact, int mesh, const Sa
 
 }  // namespace
 
-double release_drive(Work& w, const Mode& mode, int leader, Sample& s) SHIFTRIG_REALTIME {
+namespace {
+
+// Accelerations that are no more than rounding.
+double rounding_of_drive(const Work& w, double mobility, const Sample& s) {
+    return 1e-10 * torque_scale(w, s) * mobility * mobility;
+}
+
+// release_drive(), and −∞ where nothing could be tried.
+double try_departure(Work& w, const Mode& mode, int leader, Sample& s) {
     const ModelData& m = w.model;
     ScratchData& scratch = w.scratch;
     signed char* part = scratch.family.data();
     const double mobility = find_family(w, mode, leader, part);
     if (mobility == 0) return -1;
 
-    const double threshold = 1e-10 * torque_scale(w, s) * mobility * mobility;
+    const double threshold = rounding_of_drive(w, mobility, s);
     unsigned char* trial = scratch.trial.data();
     std::copy(s.torque, s.torque + m.torques, scratch.torque_copy.data());
     // To set it moving, the load must overcome what its pairs can hold, not what they pass on sliding; but a pair that
@@ -136,7 +144,17 @@ double release_drive(Work& w, const Mode& mode, int leader, Sample& s) SHIFTRIG_
     std::copy(sliding, sliding + m.pairs, s.sliding);
     contact_forces(w, w.contact, s);
     internal_torques(w, mode, s);
-    return std::max(best, -1e10 * threshold);  // held whatever is tried: finite, for the search of an instant
+    return best;
+}
+
+}  // namespace
+
+double release_drive(Work& w, const Mode& mode, int leader, Sample& s) SHIFTRIG_REALTIME {
+    const double best = try_departure(w, mode, leader, s);
+    if (std::isfinite(best)) return best;
+    const double mobility = find_family(w, mode, leader, w.scratch.family.data());
+    return -1e10 *
+           rounding_of_drive(w, mobility, s);  // held whatever is tried: finite, for the search of an instant
 }
 
 LossAtRest loss_at_rest(const Work& w, int k, const Sample& s) SHIFTRIG_REALTIME {
@@ -150,33 +168,54 @@ LossAtRest loss_at_rest(const Work& w, int k, const Sample& s) SHIFTRIG_REALTIME
     return {needed, allowed};
 }
 
-LossAtRest family_loss_at_rest(Work& w, const Mode& mode, int mesh, Sample& s) SHIFTRIG_REALTIME {
+namespace {
+
+// What it takes by itself.
+LossAtRest alone(const Work& w, int mesh, const Sample& s) {
+    const LossAtRest loss = loss_at_rest(w, mesh, s);
+    return {std::fabs(loss.needed), loss.allowed};
+}
+
+}  // namespace
+
+void family_losses(Work& w, const Mode& mode, int leader, Sample& s, LossAtRest* losses) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
-    const auto alone = [&] {
-        LossAtRest loss = loss_at_rest(w, mesh, s);
-        loss.needed = std::fabs(loss.needed);
-        return loss;
-    };
-    const signed char* part = w.scratch.family.data();
+    const signed char* const part = w.scratch.family.data();
+    const double mobility = find_family(w, mode, leader, w.scratch.family.data());
+    int members = 0;
+    for (int k = 0; k < m.first_flank; ++k) members += part[k] != 0;
+    if (mobility == 0 || members <= 1) {
+        losses[leader] = alone(w, leader, s);
+        return;
+    }
+    const Certificate kept = w.outputs.certificate;  // what is only told does not count
+    std::fill(s.rate, s.rate + m.states, 0.);        // where nothing can be tried
+    const double drive = try_departure(w, mode, leader, s);
+    const auto misses = w.outputs.certificate.mode_misses;
+    w.outputs.certificate = kept;
+    w.outputs.certificate.mode_misses = misses;
+    const double of_leader = slip_of(mesh_of(w, leader).motion(), s.rate);
+    const double needed = std::fabs(s.torque[m.pairs + m.meshes + leader]);
+    const double allowed = std::max(0., needed - drive / (mobility * mobility));
+    for (const int k : m.lossy_meshes) {
+        if (k != leader && part[m.pairs + k] == 0) continue;
+        const double ratio = std::fabs(of_leader / slip_of(mesh_of(w, k).motion(), s.rate));
+        losses[k] = std::isfinite(ratio) && std::isfinite(allowed)
+                        ? LossAtRest{needed * ratio, allowed * ratio}
+                        : alone(w, k, s);
+    }
+}
+
+int leader_of(Work& w, const Mode& mode, int mesh) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
         const int leader = mode.rows[r] - m.pairs - m.meshes;
-        const double mobility = find_family(w, mode, leader, w.scratch.family.data());
-        if (mobility == 0 || (mesh != leader && part[m.pairs + mesh] == 0)) continue;
-        int members = 0;
-        for (int k = 0; k < m.first_flank; ++k) members += part[k] != 0;
-        if (members <= 1) return alone();
-        const Certificate kept = w.outputs.certificate;  // what is only told does not count
-        std::fill(s.rate, s.rate + m.states, 0.);        // where nothing can be tried
-        const double drive = release_drive(w, mode, leader, s);
-        w.outputs.certificate = kept;
-        const double of_leader = slip_of(mesh_of(w, leader).motion(), s.rate),
-                     of_mesh = slip_of(mesh_of(w, mesh).motion(), s.rate);
-        if (of_mesh == 0) return alone();
-        const double needed = std::fabs(s.torque[m.pairs + m.meshes + leader]),
-                     ratio = std::fabs(of_leader / of_mesh);
-        return {needed * ratio, std::max(0., needed - drive / (mobility * mobility)) * ratio};
+        if (leader == mesh) return leader;
+        if (find_family(w, mode, leader, w.scratch.family.data()) != 0 &&
+            w.scratch.family[static_cast<std::size_t>(m.pairs + mesh)] != 0)
+            return leader;
     }
-    return alone();
+    return -1;
 }
 
 double loss_left(const Work& w, int mesh, const Sample& s) SHIFTRIG_REALTIME {
@@ -240,9 +279,12 @@ bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
     const ModelData& m = w.model;
     unsigned char* const release = w.scratch.changed.data();  // to tell of it tries again
     std::copy(w.scratch.release.begin(), w.scratch.release.begin() + m.contact_bytes, release);
-    for (int k = m.pairs; k < m.first_flank; ++k) {
-        if (w.contact[k] != stuck || release[k] == stuck) continue;
-        log_release(w, k, s.at.time, family_loss_at_rest(w, mode, k - m.pairs, s));
+    LossAtRest* const losses = w.scratch.losses.data();
+    for (const int k : m.lossy_meshes) losses[k] = alone(w, k, s);
+    family_losses(w, mode, leader, s, losses);
+    for (const int k : m.lossy_meshes) {
+        if (w.contact[m.pairs + k] != stuck || release[m.pairs + k] == stuck) continue;
+        log_release(w, m.pairs + k, s.at.time, losses[k]);
     }
     std::copy(release, release + m.contact_bytes, w.contact);
     contact_forces(w, w.contact, s);

@@ -5,14 +5,13 @@
 
 namespace shiftrig::plant::detail {
 
-// What a stuck mesh takes to stay at rest, and the loss it has at its torque if it moves that way.
-struct LossAtRest {
-    double needed, allowed;
-};
 LossAtRest loss_at_rest(const Work& work, int mesh, const Sample& sample) SHIFTRIG_REALTIME;
-// The same with all that moves with it: what all the losses of that motion would have to be, as a torque at this mesh, and what
-// they can be.
-LossAtRest family_loss_at_rest(Work& work, const Mode& mode, int mesh, Sample& sample) SHIFTRIG_REALTIME;
+// The same of each mesh that moves with this leader: what all the losses of that motion would have to be, as a torque at this mesh,
+// and what they can be. By mesh.
+void family_losses(Work& work, const Mode& mode, int leader, Sample& sample,
+                   LossAtRest* losses) SHIFTRIG_REALTIME;
+// With whom a stuck mesh moves; −1: others hold it.
+int leader_of(Work& work, const Mode& mode, int mesh) SHIFTRIG_REALTIME;
 // What is left of the loss that a stuck mesh can take [Nm].
 double loss_left(const Work& work, int mesh, const Sample& sample) SHIFTRIG_REALTIME;
 

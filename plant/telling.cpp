@@ -45,7 +45,8 @@ void tell_loop(Work& w, const Mode& mode, int pair, const Sample& s) {
         if (mode.loop[k] == mode.loop[pair])
             event.members |= std::uint64_t{1} << std::min(k - first, most_members);
     }
-    if (!log_event(w, event)) return;  // in the next step, then
+    if (w.outputs.event_count >= Outputs::event_capacity) return;  // in the next step, then
+    log_event(w, event);
     double* const told = w.next + m.layout.loops;
     for (int k = first; k < m.pairs; ++k) {
         if (mode.loop[k] == mode.loop[pair]) told[k] = 1;
@@ -119,13 +120,18 @@ void log_release(Work& w, int device, double time, const LossAtRest& loss) SHIFT
 
 void tell_closings(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const int count = std::min(w.outputs.event_count, Outputs::event_capacity);
+    int known = -1;  // whose family's losses are there
     for (int& i = w.scratch.told_events; i < count; ++i) {
         Event& event = w.outputs.events[static_cast<std::size_t>(i)];
         if (event.kind == EventKind::lock) {
             event.torque = s.torque[event.device];
         } else if (event.kind == EventKind::mesh_sticks) {
-            const LossAtRest loss = family_loss_at_rest(w, mode, event.device - w.model.pairs, s);
-            event.torque = loss.needed;
+            const int mesh = event.device - w.model.pairs, leader = leader_of(w, mode, mesh);
+            LossAtRest* const losses = w.scratch.losses.data();
+            if (leader >= 0 && leader != known) family_losses(w, mode, leader, s, losses);
+            if (leader >= 0) known = leader;
+            const LossAtRest loss = leader >= 0 ? losses[mesh] : loss_at_rest(w, mesh, s);
+            event.torque = std::fabs(loss.needed);
             event.capacity = loss.allowed;
         }
     }
@@ -135,14 +141,9 @@ void tell_resting(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     for (const int k : w.model.lossy_meshes) {
         const int device = w.model.pairs + k;
         if (w.contact[device] != stuck || is_told(w, device)) continue;
-        const LossAtRest loss = family_loss_at_rest(w, mode, k, s);
-        log_event(w, {.time = s.at.time,
-                      .kind = EventKind::mesh_sticks,
-                      .device = device_index(device),
-                      .torque = loss.needed,
-                      .capacity = loss.allowed});
+        log_event(w, {.time = s.at.time, .kind = EventKind::mesh_sticks, .device = device_index(device)});
     }
-    w.scratch.told_events = std::min(w.outputs.event_count, Outputs::event_capacity);
+    tell_closings(w, mode, s);
 }
 
 void tell_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {

@@ -52,7 +52,6 @@ Command::Run declare_check(CLI::App& app) {
     app.add_flag("--shapes", options->shapes, "print the mode shapes of every gear and state");
     add_number(app, "--rate-hz", options->rate_hz, {1, 1e5},
                "of the run to be: warn of what its steps cannot resolve")
-        ->check(CLI::Range(1., 1e5))
         ->capture_default_str();
     app.add_option("--dot", options->dot, "write the driveline as Graphviz text into this file");
     app.add_option("--svg", options->svg, "draw the driveline and its gear table into this file");

@@ -11,7 +11,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr int format_version = 1;
+constexpr int format_version = 2;
 
 // Units go by their symbol, so that a reader in another language needs no table of ours.
 plant::Unit unit_of(const std::string& symbol) {

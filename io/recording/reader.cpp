@@ -279,6 +279,11 @@ bool RecordingReader::Implementation::next(RecordedTick& tick) {
             if (e.device < -1 || e.device >= static_cast<std::int64_t>(manifest.devices.size()) ||
                 e.kind < 0 || e.kind > static_cast<std::int32_t>(plant::EventKind::untold))
                 return damaged("an event of an unknown device or kind");
+            const std::uint64_t named = happened.members & ~(std::uint64_t{1} << plant::most_members);
+            if (happened.members != 0 &&
+                (happened.kind != plant::EventKind::tie_up || e.device < 0 ||
+                 static_cast<std::size_t>(e.device) + std::bit_width(named) > manifest.devices.size()))
+                return damaged("an event of a loop with unknown members");
             tick.events.push_back(happened);
         } else if (event.channel == channel::record_timing) {
             record_timing_t timing;

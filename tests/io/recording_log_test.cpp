@@ -82,6 +82,8 @@ TEST_P(RoundTrip, EveryBitOfEveryTickComesBack) {
             EXPECT_EQ(tick.events.back().time, expected.events.back().time);
             EXPECT_EQ(tick.events.back().torque, expected.events.back().torque);
             EXPECT_EQ(tick.events.back().device, 1);
+            EXPECT_EQ(tick.events.back().value, expected.events.back().value);
+            EXPECT_EQ(tick.events.back().members, expected.events.back().members);
         }
         EXPECT_EQ(tick.closing.torque_residual, expected.record.certificate.torque_residual);
         EXPECT_EQ(tick.closing.messages_lost, n / 7);
@@ -226,6 +228,31 @@ TEST(WrongRecording, ChunkOfAnotherLayout) {
     write_file(file.path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     EXPECT_EQ(complaint_about(file.path),
               file.path + ": was written with another layout of record_chunk_t than this program's");
+}
+
+// A loop of F0 and others that the machine does not have; members of a pair that locks.
+TEST(WrongRecording, LoopWhoseMembersAreNoDevices) {
+    const auto complaint = [](plant::EventKind kind, int device, std::uint64_t members) {
+        TemporaryFile file(".lcmlog");
+        Tick tick;
+        {
+            RecordingWriter writer(file.path);
+            writer.begin(manifest());
+            fill(tick, 0);
+            plant::Event event{.kind = kind, .device = static_cast<std::int16_t>(device), .members = members};
+            tick.events.assign(1, event);
+            tick.record.events = tick.events;
+            writer.tick(tick.record);
+            writer.end();
+        }
+        return complaint_about(file.path);
+    };
+    constexpr auto tie_up = plant::EventKind::tie_up;
+    EXPECT_EQ(complaint(tie_up, 0, 7), "");
+    EXPECT_EQ(complaint(tie_up, 1, 3 | std::uint64_t{1} << plant::most_members), "");
+    for (const std::string& said : {complaint(tie_up, 0, 8), complaint(tie_up, 2, 2),
+                                    complaint(tie_up, -1, 1), complaint(plant::EventKind::lock, 0, 1)})
+        EXPECT_NE(said.find("an event of a loop with unknown members"), std::string::npos) << said;
 }
 
 TEST(WrongRecording, WithoutItsClosingRecord) {

@@ -93,6 +93,11 @@ inline void fill(Tick& t, std::int64_t n) {
         e.torque = -x;
         e.capacity = 2 * x;
         e.slip = 1e-12;
+        if (n % 8 == 1) {
+            e.kind = plant::EventKind::tie_up;
+            e.value = 0.5 * x;
+            e.members = 3;
+        }
         t.events.assign(static_cast<std::size_t>(n % 3 + 1), e);
     }
     t.state.assign(3000, static_cast<std::byte>(n % 251));

@@ -115,6 +115,31 @@ TEST(Explain, GearsOfOneMotionAreToldWithAllTheirLosses) {
     }
 }
 
+// Four gears without loss by load, 1 Nm in the bearing of each: the train takes 4 Nm, however little of it is needed.
+TEST(Explain, WhatATrainAllowsDoesNotHangOnItsLoad) {
+    for (const double load : {0., 0.01, 0.5, 3.}) {
+        for (const Method method : {Method::etd3, Method::ark3}) {
+            Description d;
+            d.name = "train";
+            d.method = method;
+            d.masses = {mass("m0", 1)};
+            for (int i = 1; i <= 4; ++i) {
+                const std::string name = std::to_string(i);
+                d.masses.push_back(mass("m" + name, 1));
+                d.gears.push_back(lossy_gear("g" + name, "m" + std::to_string(i - 1), "m" + name, 1, 1, 1));
+            }
+            d.sources = {source("m0", constant(load))};
+            Rig rig(d);
+            rig.step();
+            ASSERT_EQ(rig.events.size(), 4u);
+            for (const Event& event : rig.events) {
+                EXPECT_NEAR(event.torque, load, 1e-9);
+                EXPECT_NEAR(event.capacity, 4, 1e-6) << load;
+            }
+        }
+    }
+}
+
 // A load that swings through zero speed faster than any loss could hold it: one line, not "sticks" and "moves".
 TEST(Explain, AMeshThatOnlyPassesThroughRestIsToldOnce) {
     Description d;

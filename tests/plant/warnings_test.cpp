@@ -288,6 +288,10 @@ TEST(Warnings, NameAModeThatTurnsFrictionRoundFasterThanTheStepResolves) {
                     "0.413 ms or "
                     "maximum_parts 64, damp it, or make the mass part of its neighbour"});
     EXPECT_EQ(warnings_of(light_mass_with_brake(), 0.41e-3), Lines{});
+    // Only what a model file may have is advised.
+    const Lines coarse = warnings_of(light_mass_with_brake(), 10e-3);
+    ASSERT_EQ(coarse.size(), 1u);
+    EXPECT_EQ(coarse[0].find("maximum_parts"), std::string::npos) << coarse[0];
     EXPECT_EQ(warnings_of(light_mass_with_brake(1e-3, 64)), Lines{});
     EXPECT_EQ(warnings_of(light_mass_with_brake(1)), Lines{});
     Description d = light_mass_with_brake();
