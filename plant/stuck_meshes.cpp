@@ -151,10 +151,9 @@ double try_departure(Work& w, const Mode& mode, int leader, Sample& s) {
 
 double release_drive(Work& w, const Mode& mode, int leader, Sample& s) SHIFTRIG_REALTIME {
     const double best = try_departure(w, mode, leader, s);
-    if (std::isfinite(best)) return best;
     const double mobility = find_family(w, mode, leader, w.scratch.family.data());
-    return -1e10 *
-           rounding_of_drive(w, mobility, s);  // held whatever is tried: finite, for the search of an instant
+    // Held whatever is tried: finite, for the search of an instant.
+    return mobility == 0 ? best : std::max(best, -1e10 * rounding_of_drive(w, mobility, s));
 }
 
 LossAtRest loss_at_rest(const Work& w, int k, const Sample& s) SHIFTRIG_REALTIME {
