@@ -33,7 +33,7 @@ nlohmann::json event_json(const plant::Event& event, const std::string& device,
             break;
         case K::facing_warning:
         case K::facing_failure:
-            json["temperature_c"] = event.value;
+            json["temperature_degc"] = event.value;
             break;
         case K::mesh_releases:
             json["passes_through"] = event.value != 0;

@@ -10,7 +10,7 @@
 namespace shiftrig::io {
 
 // time_s, kind, device, torque_nm, capacity_nm, slip_rad_s; margin_nm where a torque is compared with a capacity; and what else the
-// kind has: x, flank, speed_rad_s, temperature_c, members, passes_through, count.
+// kind has: x, flank, speed_rad_s, temperature_degc, members, passes_through, count.
 nlohmann::json event_json(const plant::Event& event, const std::string& device,
                           const std::vector<std::string>& members = {});
 

@@ -54,7 +54,14 @@ const json event_schema = {{"type", "object"},
                              {"torque_nm", {{"type", "number"}, {"unit", "Nm"}}},
                              {"capacity_nm", {{"type", "number"}, {"unit", "Nm"}}},
                              {"margin_nm", {{"type", "number"}, {"unit", "Nm"}}},
-                             {"slip_rad_s", {{"type", "number"}, {"unit", "rad/s"}}}}}};
+                             {"slip_rad_s", {{"type", "number"}, {"unit", "rad/s"}}},
+                             {"x", {{"type", "number"}}},
+                             {"flank", {{"type", "number"}}},
+                             {"speed_rad_s", {{"type", "number"}, {"unit", "rad/s"}}},
+                             {"temperature_degc", {{"type", "number"}, {"unit", "degC"}}},
+                             {"members", {{"type", "array"}, {"items", {{"type", "string"}}}}},
+                             {"passes_through", {{"type", "boolean"}}},
+                             {"count", {{"type", "number"}}}}}};
 
 }  // namespace
 
