@@ -78,37 +78,19 @@ void step_chain(benchmark::State& bench, Contact contact, Method method) {
     bench.counters["fall_backs"] = machine.outputs.certificate.fall_backs;
 }
 
-BENCHMARK_CAPTURE(step_chain, locked, Contact::locked, Method::automatic)
-    ->Arg(2)
-    ->Arg(10)
-    ->Arg(50)
-    ->Arg(100)
-    ->Arg(200)
-    ->Arg(500)
-    ->Arg(1000);
-BENCHMARK_CAPTURE(step_chain, slipping, Contact::slipping, Method::automatic)
-    ->Arg(2)
-    ->Arg(10)
-    ->Arg(50)
-    ->Arg(100)
-    ->Arg(200)
-    ->Arg(500)
-    ->Arg(1000);
+void all_lengths(benchmark::internal::Benchmark* bench) {
+    for (const int masses : {2, 10, 50, 100, 200, 500, 1000}) bench->Arg(masses);
+}
+
+BENCHMARK_CAPTURE(step_chain, locked, Contact::locked, Method::automatic)->Apply(all_lengths);
+BENCHMARK_CAPTURE(step_chain, slipping, Contact::slipping, Method::automatic)->Apply(all_lengths);
 BENCHMARK_CAPTURE(step_chain, alternating, Contact::alternating, Method::automatic)
     ->Arg(2)
     ->Arg(10)
     ->Arg(50)
     ->Arg(200)
     ->Arg(1000);
-BENCHMARK_CAPTURE(step_chain, event, Contact::event, Method::automatic)
-    ->UseManualTime()
-    ->Arg(2)
-    ->Arg(10)
-    ->Arg(50)
-    ->Arg(100)
-    ->Arg(200)
-    ->Arg(500)
-    ->Arg(1000);
+BENCHMARK_CAPTURE(step_chain, event, Contact::event, Method::automatic)->UseManualTime()->Apply(all_lengths);
 BENCHMARK_CAPTURE(step_chain, swinging, Contact::swinging, Method::automatic)->Arg(50)->Arg(200)->Arg(1000);
 BENCHMARK_CAPTURE(step_chain, swinging_hard, Contact::swinging_hard, Method::automatic)
     ->Arg(50)

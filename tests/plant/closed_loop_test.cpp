@@ -57,32 +57,29 @@ std::vector<Event> tie_ups(const Rig& rig) {
 
 // Two loops one after the other, then two in the same step: each is told by itself.
 TEST(ClosedLoop, EachLoopIsToldByItself) {
-    for (const Method method : {Method::etd3, Method::automatic}) {
-        Description d;
-        d.name = "two loops";
-        d.method = method;
-        d.masses = {mass("a", 1), mass("b", 1), mass("c", 1)};
-        const ActuationDirect commanded{{}, 0};
-        d.clutches = {clutch("K1", "a", "b", 100, 1, ActuationDirect{{}, 1}),
-                      clutch("K2", "a", "b", 100, 1, commanded), clutch("K3", "b", "c", 100, 1, commanded),
-                      clutch("K4", "b", "c", 100, 1, ActuationDirect{{}, 1})};
-        for (const bool together : {false, true}) {
-            Rig rig(d);
-            rig.run(0.01);
-            EXPECT_TRUE(tie_ups(rig).empty());
-            rig.in("clutch.K2.engagement") = 1;
-            if (together) rig.in("clutch.K3.engagement") = 1;
-            rig.run(0.02);
-            rig.in("clutch.K3.engagement") = 1;
-            rig.run(0.03);
-            const std::vector<Event> told = tie_ups(rig);
-            ASSERT_EQ(told.size(), 2u);
-            EXPECT_NE(explain(rig.model, told[0]).find("closed loop of K1, K2:"), std::string::npos)
-                << explain(rig.model, told[0]);
-            EXPECT_NE(explain(rig.model, told[1]).find("closed loop of K3, K4:"), std::string::npos)
-                << explain(rig.model, told[1]);
-            EXPECT_TRUE(rig.flags & 1);
-        }
+    Description d;
+    d.name = "two loops";
+    d.masses = {mass("a", 1), mass("b", 1), mass("c", 1)};
+    const ActuationDirect commanded{{}, 0};
+    d.clutches = {clutch("K1", "a", "b", 100, 1, ActuationDirect{{}, 1}),
+                  clutch("K2", "a", "b", 100, 1, commanded), clutch("K3", "b", "c", 100, 1, commanded),
+                  clutch("K4", "b", "c", 100, 1, ActuationDirect{{}, 1})};
+    for (const bool together : {false, true}) {
+        Rig rig(d);
+        rig.run(0.01);
+        EXPECT_TRUE(tie_ups(rig).empty());
+        rig.in("clutch.K2.engagement") = 1;
+        if (together) rig.in("clutch.K3.engagement") = 1;
+        rig.run(0.02);
+        rig.in("clutch.K3.engagement") = 1;
+        rig.run(0.03);
+        const std::vector<Event> told = tie_ups(rig);
+        ASSERT_EQ(told.size(), 2u);
+        EXPECT_NE(explain(rig.model, told[0]).find("closed loop of K1, K2:"), std::string::npos)
+            << explain(rig.model, told[0]);
+        EXPECT_NE(explain(rig.model, told[1]).find("closed loop of K3, K4:"), std::string::npos)
+            << explain(rig.model, told[1]);
+        EXPECT_TRUE(rig.flags & 1);
     }
 }
 
