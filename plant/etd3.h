@@ -9,4 +9,8 @@ namespace shiftrig::plant::detail {
 // the internal torques at the end (a left limit). `end_fraction` is where the end lies in the whole step.
 void advance(Work& work, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME;
 
+// Coordinates half way through the part just computed: the step's own solution, which is exact for forces on the parabola
+// through its three.
+void coordinates_half_way(Work& work, const Mode& mode, double* coordinates) SHIFTRIG_REALTIME;
+
 }  // namespace shiftrig::plant::detail

@@ -1,6 +1,7 @@
 #include "plant/kernels.h"
 
 #include <cstdint>
+#include <type_traits>
 
 #include "plant/math/elementary.h"
 
@@ -34,6 +35,11 @@ void multiply_portable(const double* panel, int rows, int columns, const double*
     if (r < rows) multiply_panel<4>(panel + r * columns, columns, v, y0 ? y0 + r : nullptr, y + r);
 }
 
+void multiply_each_portable(const double* panel, int rows, int columns, const double* v, int count,
+                            double* y) SHIFTRIG_REALTIME {
+    for (; count > 0; --count, v += rows, y += rows) multiply_portable(panel, rows, columns, v, nullptr, y);
+}
+
 constexpr int lanes = 2;
 
 #include "plant/lanes_body.h"
@@ -46,25 +52,29 @@ inline double joined(const Lanes& v, const Join& join) noexcept {
     return join(v[0], v[1]);
 }
 
+#include "plant/algebra_body.h"
 #include "plant/device_loops_body.h"
 
 }  // namespace
 
 Kernel portable_kernel() {
-    Kernel kernel{KernelKind::portable, "portable", {}, device_loops};
+    Kernel kernel{KernelKind::portable, "portable", {}, {}, device_loops, {combine, place}};
     for (Multiply& product : kernel.products) product = multiply_portable;
+    for (MultiplyEach& products : kernel.multiples) products = multiply_each_portable;
     return kernel;
 }
 
 void to_panels(const double* matrix, int rows, int columns, double* panel) SHIFTRIG_REALTIME {
-    const int stride = padded(rows);
-    for (int first = 0; first < stride; first += panel_rows) {
-        const int height = stride - first < panel_rows ? stride - first : panel_rows;
-        for (int c = 0; c < columns; ++c) {
-            const double* from = matrix + c * stride + first;
-            for (int r = 0; r < height; ++r) *panel++ = from[r];
+    const int stride = padded(rows), whole = stride / panel_rows * panel_rows;
+    const auto copy = [&](int first, auto height) {
+        const double* from = matrix + first;
+        for (int c = 0; c < columns; ++c, from += stride, panel += height) {
+            for (int r = 0; r < height; ++r) panel[r] = from[r];
         }
-    }
+    };
+    for (int first = 0; first < whole; first += panel_rows)
+        copy(first, std::integral_constant<int, panel_rows>{});
+    if (whole < stride) copy(whole, std::integral_constant<int, 4>{});
 }
 
 Kernel choose_kernel(KernelKind kind) {

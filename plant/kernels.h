@@ -46,19 +46,56 @@ constexpr int panel_index(int rows, int columns, int r, int c) noexcept {
 using Multiply = void (*)(const double* panel, int rows, int columns, const double* v, const double* y0,
                           double* y) SHIFTRIG_REALTIME;
 
+// The same of so many columns v, each and its product `rows` doubles behind the one before.
+using MultiplyEach = void (*)(const double* panel, int rows, int columns, const double* v, int count,
+                              double* y) SHIFTRIG_REALTIME;
+
+// One of up to four that are summed.
+struct Term {
+    double factor = 0;
+    const double* of = nullptr;
+};
+
+// Where columns of a block go in a matrix that is stored in panels, and what their rows and columns are multiplied with.
+struct Placing {
+    int rows = 0, width = 0;  // of the whole matrix
+    int top = 0, block_rows = 0;
+    int first_column = 0, columns = 0;
+    const double* row_scale = nullptr;     // per row of the block
+    const double* column_scale = nullptr;  // per column; null: 1
+};
+
+// For building operators.
+struct AlgebraLoops {
+    // The first `count` numbers of Σ factor · of.
+    void (*combine)(const Term* term, int terms, int count, double* sum) SHIFTRIG_REALTIME = nullptr;
+    // Of a source with block_rows rows, column after column.
+    void (*place)(const Placing& placing, const double* source, double factor,
+                  double* panels) SHIFTRIG_REALTIME = nullptr;
+};
+
 // One implementation for each of the heights 4, 8, … 24, so that none has to ask, and one for all taller products.
 constexpr int short_products = 6;
 struct Kernel {
     KernelKind kind{};
     const char* name = "";
     Multiply products[short_products + 1] = {};  // [rows / 4 − 1], the taller ones last
+    MultiplyEach multiples[short_products + 1] = {};
     DeviceLoops loops;
+    AlgebraLoops algebra;
 
     void multiply(const double* panel, int rows, int columns, const double* v, const double* y0,
                   double* y) const SHIFTRIG_REALTIME {
-        if (rows <= 0) return;
-        products[(rows < 4 * short_products ? rows : 4 * (short_products + 1)) / 4 - 1](panel, rows, columns,
-                                                                                        v, y0, y);
+        if (rows > 0) products[by_height(rows)](panel, rows, columns, v, y0, y);
+    }
+    void multiply_each(const double* panel, int rows, int columns, const double* v, int count,
+                       double* y) const SHIFTRIG_REALTIME {
+        if (rows > 0) multiples[by_height(rows)](panel, rows, columns, v, count, y);
+    }
+
+  private:
+    static int by_height(int rows) noexcept {
+        return (rows < 4 * short_products ? rows : 4 * (short_products + 1)) / 4 - 1;
     }
 };
 

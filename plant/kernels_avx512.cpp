@@ -58,6 +58,7 @@ inline double joined(const Lanes& v, const Join& join) noexcept {
     return join(two[0], two[1]);
 }
 
+#include "plant/algebra_body.h"
 #include "plant/device_loops_body.h"
 #include "plant/kernels_body.h"
 

@@ -46,17 +46,36 @@ void product(const double* panel, int, int columns, const double* v, const doubl
         product<rows - here>(panel + here * columns, 0, columns, v, y0 ? y0 + here : nullptr, y + here);
 }
 
+constexpr Multiply parts[] = {product<4>, product<8>, product<12>, product<16>, product<20>, product<24>};
+
 SHIFTRIG_TRUSTED_BEGIN  // the compiler cannot see through a function handed on
     void
     tall_product(const double* panel, int rows, int columns, const double* v, const double* y0,
                  double* y) SHIFTRIG_REALTIME {
     constexpr int most = 4 * short_products;
-    static constexpr Multiply rest[] = {product<4>,  product<8>,  product<12>,
-                                        product<16>, product<20>, product<24>};
     int r = 0;
     for (; r + most < rows; r += most)
         product<most>(panel + r * columns, 0, columns, v, y0 ? y0 + r : nullptr, y + r);
-    rest[(rows - r) / 4 - 1](panel + r * columns, 0, columns, v, y0 ? y0 + r : nullptr, y + r);
+    parts[(rows - r) / 4 - 1](panel + r * columns, 0, columns, v, y0 ? y0 + r : nullptr, y + r);
+}
+SHIFTRIG_TRUSTED_END
+
+template <int rows>
+void products(const double* panel, int, int columns, const double* v, int count,
+              double* y) SHIFTRIG_REALTIME {
+    for (; count > 0; --count, v += rows, y += rows) product<rows>(panel, 0, columns, v, nullptr, y);
+}
+// All columns by one part of the rows after the other, which the cache then still has.
+SHIFTRIG_TRUSTED_BEGIN
+void tall_products(const double* panel, int rows, int columns, const double* v, int count,
+                   double* y) SHIFTRIG_REALTIME {
+    constexpr int most = 4 * short_products;
+    for (int r = 0; r < rows; r += most) {
+        const int height = rows - r < most ? rows - r : most;
+        const Multiply part = parts[height / 4 - 1];
+        for (int c = 0; c < count; ++c)
+            part(panel + r * columns, height, columns, v + c * rows, nullptr, y + c * rows + r);
+    }
 }
 SHIFTRIG_TRUSTED_END
 
@@ -64,5 +83,7 @@ Kernel kernel_of(KernelKind kind, const char* name) {
     return {kind,
             name,
             {product<4>, product<8>, product<12>, product<16>, product<20>, product<24>, tall_product},
-            device_loops};
+            {products<4>, products<8>, products<12>, products<16>, products<20>, products<24>, tall_products},
+            device_loops,
+            {combine, place}};
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "plant/ark3.h"
+#include "plant/etd3.h"
 #include "plant/few.h"
 #include "plant/transitions.h"
 
@@ -63,16 +64,13 @@ void mesh_torques_with(Work& w, const Mode& mode, const Sample& s, const double*
     m.kernel.multiply(mode.force_torques, count, m.forces, change, s.active, rows);
 }
 
-// The motion half way: the step's own solution, which is exact for forces on the parabola through its three.
+// The motion half way, with the forces of the stage there.
 void fill_middle(Work& w, const Mode& mode) {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
-    double* const change = s.vector_b;
-    m.kernel.loops.subtract(s.half.f, s.begin().f, m.forces, change);
-    m.kernel.loops.subtract(s.late.f, s.begin().f, m.forces, change + m.forces);
     Sample& middle = s.middle;
     double* const q = middle.f - mode.order;
-    m.kernel.multiply(s.used.middle, padded(mode.order), 2 * m.forces, change, s.half.f - mode.order, q);
+    coordinates_half_way(w, mode, q);
     show(m, mode, q, middle, m.power_rows);
     copy_few(s.half.f, m.forces, middle.f);
     middle.at = s.half.at;

@@ -111,6 +111,8 @@ ModeSizes::ModeSizes(const ModelData& m) {
     const int translating = static_cast<int>(m.translating.size());
     view = panel_size(m.seen, m.states);
     rates = panel_size(m.states, m.columns);
+    scaled_rates = m.states_padded * m.columns;
+    energy_root = 2 * m.states_padded;
     torques = panel_size(m.torques + translating, m.columns);
     force_torques = panel_size(m.torques + translating, m.forces);
     balance = panel_size(m.torques, m.columns + m.torques);
@@ -344,6 +346,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
     }
     set_loss_shares(m, mode);
     build_coordinates(m, mode, motion, torque, reaction + rows, integers);
+    scale_rates(m, mode);
 }
 
 }  // namespace shiftrig::plant::detail

@@ -54,6 +54,10 @@ struct Mode {
     double* view = nullptr;            // E and all slips   panels, seen × order
     double* mobility = nullptr;        // B                 panels, masses × masses
     double* rates = nullptr;           // [L S̃]             panels, states × (order + forces)
+    // The same of the coordinates in energy variables, padded(order) × (order + forces), and ‖L‖₁ of these [1/s].
+    double* scaled_rates = nullptr;
+    double rate_norm = 0;
+    double* energy_root = nullptr;  // per coordinate, its scale in energy variables, then the reciprocals
     double* torques =
         nullptr;  // [R_q R_f]         panels, (rows + translating) × (order + forces); the latter
                   //                   are accelerations
@@ -73,12 +77,13 @@ inline bool is_shaft_closed(const ModelData& m, const Mode& mode, int shaft) noe
 
 // Room that a mode and its operators take, in doubles and ints.
 struct ModeSizes {
-    int basis = 0, view = 0, mobility = 0, rates = 0, torques = 0, force_torques = 0, balance = 0,
-        operators = 0;
+    int basis = 0, view = 0, mobility = 0, rates = 0, scaled_rates = 0, energy_root = 0, torques = 0,
+        force_torques = 0, balance = 0, operators = 0;
     int key = 0;  // bytes, a multiple of 8
     explicit ModeSizes(const ModelData& model);
     int doubles() const noexcept {
-        return basis + view + mobility + rates + torques + force_torques + balance + 2 * operators;
+        return basis + view + mobility + rates + scaled_rates + energy_root + torques + force_torques +
+               balance + 2 * operators;
     }
 };
 
@@ -100,6 +105,9 @@ bool wedges(const ModelData& model, const Mode& mode) SHIFTRIG_REALTIME;  // Mod
 
 // Mode::row_links from its rows, and Mode::rests.
 void list_row_links(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
+
+// Mode::scaled_rates with its norm and energy_root, from its view and rates.
+void scale_rates(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
 
 // Everything of a mode but its step operators. `mode.key` is set by the caller.
 void build_mode(const ModelData& model, Mode& mode, double* workspace, int* integers) SHIFTRIG_REALTIME;

@@ -88,6 +88,7 @@ ScratchData::ScratchData(const ModelData& m) {
     for (auto* memory : {&operator_memory, &ledger_memory}) {
         *memory = aligned_doubles(static_cast<std::size_t>(ModeSizes(m).operators));
     }
+    course_memory = aligned_doubles(static_cast<std::size_t>(5 * m.states_padded));
 }
 
 }  // namespace detail
@@ -103,8 +104,8 @@ void Scratch::fill_with_nan() noexcept {
     for (auto* numbers : {&s.torque_copy, &s.held, &s.standstill}) {
         std::fill(numbers->begin(), numbers->end(), nan);
     }
-    for (auto* lines :
-         {&s.buffer, &s.vectors, &s.works, &s.workspace_memory, &s.operator_memory, &s.ledger_memory}) {
+    for (auto* lines : {&s.buffer, &s.vectors, &s.works, &s.workspace_memory, &s.operator_memory,
+                        &s.ledger_memory, &s.course_memory}) {
         for (detail::CacheLine& line : *lines) std::fill(std::begin(line.value), std::end(line.value), nan);
     }
     for (detail::PairLoad& load : s.loads) {

@@ -117,6 +117,7 @@ struct ScratchData {
     std::vector<int> workspace_index;
     std::vector<int> piece;                         // per mass
     AlignedDoubles operator_memory, ledger_memory;  // operators of a partial step, of a part of one
+    AlignedDoubles course_memory;                   // of an Interpolant
     int told_events = 0;                            // so many of this step's events are told in full
     bool turned = false;                            // power turned round in some mesh within the last part
     StepOperators used;                             // by the last advance

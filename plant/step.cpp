@@ -1,6 +1,7 @@
 // One step of the plant. [Algin] Fig. 10, with the state changes of eq. (12), (13) found inside the step.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plant/ark3.h"
 #include "plant/contact_table.h"
@@ -9,6 +10,7 @@
 #include "plant/finish.h"
 #include "plant/flanks.h"
 #include "plant/forces.h"
+#include "plant/interpolant.h"
 #include "plant/ledger.h"
 #include "plant/refinement.h"
 #include "plant/telling.h"
@@ -24,8 +26,8 @@ constexpr double instant = 1e-10;  // parts of a step shorter than this are none
 // Where the part beginning at `from` must end at the latest: laws jump there.
 double next_split(const Work& w, double from) SHIFTRIG_REALTIME {
     double split = 1;
-    const auto consider = [&](double fraction) {
-        if (fraction > from + 1e-9 && fraction < split - 1e-9) split = fraction;
+    const auto consider = [&](double fraction, double tolerance = 1e-9) {
+        if (fraction > from + tolerance && fraction < split - tolerance) split = fraction;
     };
     const ScratchData& scratch = w.scratch;
     for (int i = 0; i < scratch.moving_count; ++i) {
@@ -35,7 +37,7 @@ double next_split(const Work& w, double from) SHIFTRIG_REALTIME {
     const std::vector<double>& times = w.model.breakpoints;
     const auto first = std::upper_bound(times.begin(), times.end(), w.start + from * w.h);
     for (auto time = first; time != times.end() && *time < w.start + w.h; ++time)
-        consider((*time - w.start) / w.h);
+        consider((*time - w.start) / w.h, time_rounding(*time) / w.h);
     for (int i = 0; i < scratch.moving_count; ++i) {
         consider(load_edge(w, scratch.moving[static_cast<std::size_t>(i)], from, split));
     }
@@ -69,30 +71,68 @@ void integrate(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME
     }
 }
 
-// Partial steps to where the device's margin vanishes: one as a rule, more where the margin is far from
-// its parabola (shafts that swing within the step). Returns the fraction reached; `end` is there.
+// Looks for the place where a margin vanishes that is positive at `low` and negative at `high`.
+struct RootSearch {
+    double low, high;
+    double at_low, at_high;
+    double place;      // looked at next
+    double slope = 0;  // between the last two places; 0: not known
+    double last = std::numeric_limits<double>::quiet_NaN(), at_last = 0;
+
+    double size() const { return std::fabs(at_low) + std::fabs(at_high); }
+    // The margin at that place; goes on to the one that follows from it, and so much beyond: by the slope, else by the
+    // secant of the bracket or, where that begins at no margin at all, to its middle.
+    void tell(double margin, double beyond = 0) {
+        if (std::fabs(place - last) > 0) slope = (margin - at_last) / (place - last);
+        last = place;
+        at_last = margin;
+        (margin > 0 ? low : high) = place;
+        (margin > 0 ? at_low : at_high) = margin;
+        place = last - at_last / slope + beyond;
+        if (slope < 0 && place > low + instant && place < high) return;
+        const double share = at_low > 1e-12 * size() ? at_low / (at_low - at_high) : 0.5, width = high - low;
+        place = std::clamp(low + share * width + beyond, low + 0.01 * width, low + 0.99 * width);
+    }
+};
+
+// Goes to where the margin vanishes on the interpolant of the part just computed, which is nearly as good as a step there,
+// and takes its slope.
+void look_ahead(Work& w, const Mode& mode, const Crossing& crossing, RootSearch& search) SHIFTRIG_REALTIME {
+    constexpr int most_looks = 8;
+    const double from = search.low, length = search.high - search.low, close_enough = 1e-7 * search.size();
+    const Interpolant part = interpolate_part(w, mode);
+    RootSearch looks = search;
+    for (int k = 0; k < most_looks; ++k) {
+        search.place = looks.place;
+        sample_within(w, mode, part, (looks.place - from) / length, w.scratch.middle);
+        const double rest = crossing_margin(w, mode, crossing, w.scratch.middle);
+        looks.tell(rest);
+        if (std::fabs(rest) <= close_enough) break;
+    }
+    search.slope = looks.slope;
+}
+
+// Partial steps to where the device's margin vanishes: one as a rule, more where the interpolant errs (forces that
+// change much about that place, shafts that swing within the step). Returns the fraction reached; `end` is there.
 double approach(Work& w, const Mode& mode, const Crossing& crossing, double done,
                 double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 4;
+    const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
+    RootSearch search{done, until, left(w.scratch.begin()), left(w.scratch.end()),
+                      done + crossing.theta * (until - done)};
     // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
     // beyond. So too with a pair that lets go at next to no torque: this side of it, it would only lock again.
     const bool by_itself = acts_by_itself(crossing.change), overrun = crossing.change == Change::overrun;
-    const double close_enough = by_itself ? 1e-2 : overrun ? 1e-3 : 1e-5;
-    const double beyond = by_itself ? 3e-3 : overrun ? 3e-4 : 0;
-    double low = done, high = until;
-    const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
-    double at_low = left(w.scratch.begin()), at_high = left(w.scratch.end());
-    const double size = std::fabs(at_low) + std::fabs(at_high);
-    double reached = done + std::min(crossing.theta + beyond, 1.) * (until - done);
+    const double close_enough = (by_itself ? 1e-2 : overrun ? 1e-3 : 1e-5) * search.size();
+    const double beyond = (by_itself ? 3e-3 : overrun ? 3e-4 : 0) * (until - done);
+    if (!mode.tree) look_ahead(w, mode, crossing, search);
+    search.place = std::min(search.place + beyond, until);
     for (int steps = 1;; ++steps) {
+        const double reached = search.place;
         integrate(w, mode, reached);
         const double rest = left(w.scratch.end());
-        if (std::fabs(rest) <= close_enough * size || steps == most_steps) return reached;
-        (rest > 0 ? low : high) = reached;
-        (rest > 0 ? at_low : at_high) = rest;
-        // Secant, kept off the ends of the bracket.
-        const double share = at_low > 1e-12 * size ? at_low / (at_low - at_high) : 0.5;
-        reached = low + std::clamp(share + beyond, 0.01, 0.99) * (high - low);
+        if (std::fabs(rest) <= close_enough || steps == most_steps) return reached;
+        search.tell(rest, beyond);
     }
 }
 

@@ -2,10 +2,10 @@
 //
 //     f(t) = Σ over active pieces of offset + slope (t − from) + amplitude sin(2π frequency (t − phase_time))
 //
-// A piece is active on [from, until); its left limit is taken on (from, until]. Times closer than 1e-9 s to an
-// edge count as the edge, since n·h need not meet a decimal number exactly.
+// A piece is active on [from, until); its left limit is taken on (from, until]. Times within rounding of an edge count as the
+// edge, since n·h need not meet a decimal number exactly. No more than that: what follows an edge may be over sooner than
+// one thinks, and its end must not be taken for the time before the edge. Inside a step, parts of it end at edges.
 // An open start (from = −1e300) has its slope reckoned from t = 0.
-// Does not model: edges inside a step are not localised; put them on the step grid.
 #pragma once
 
 #include "plant/description.h"
@@ -15,8 +15,13 @@ namespace shiftrig::plant {
 
 enum class Side { left, right };  // limit from the past, from the future
 
+// By how much a time may miss the number that is meant.
+inline double time_rounding(double t) noexcept {
+    return 4e-15 * (t < -1 ? -t : t > 1 ? t : 1);
+}
+
 inline double waveform(const Waveform& wave, double t, Side side = Side::right) noexcept {
-    const double probe = side == Side::right ? t + 1e-9 : t - 1e-9;
+    const double probe = side == Side::right ? t + time_rounding(t) : t - time_rounding(t);
     double sum = 0;
     for (const Waveform::Piece& piece : wave.pieces) {
         if (!(piece.from <= probe && probe < piece.until)) continue;

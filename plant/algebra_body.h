@@ -1,0 +1,49 @@
+// Loops over whole matrices, for building operators (kernels.h says what they do): included as device_loops_body.h is.
+
+template <int terms>
+inline void combine_terms(const Term* term, int count, double* sum) noexcept {
+    int i = 0;
+    for (; i + lanes <= count; i += lanes) {
+        Lanes total = term[0].factor * read(term[0].of + i);
+        if constexpr (terms > 1) total += term[1].factor * read(term[1].of + i);
+        if constexpr (terms > 2) total += term[2].factor * read(term[2].of + i);
+        if constexpr (terms > 3) total += term[3].factor * read(term[3].of + i);
+        write(sum + i, total);
+    }
+    for (; i < count; ++i) {
+        double total = term[0].factor * term[0].of[i];
+        for (int k = 1; k < terms; ++k) total += term[k].factor * term[k].of[i];
+        sum[i] = total;
+    }
+}
+
+void combine(const Term* term, int terms, int count, double* sum) SHIFTRIG_REALTIME {
+    switch (terms) {
+        case 1:
+            return combine_terms<1>(term, count, sum);
+        case 2:
+            return combine_terms<2>(term, count, sum);
+        case 3:
+            return combine_terms<3>(term, count, sum);
+        default:
+            return combine_terms<4>(term, count, sum);
+    }
+}
+
+void place(const Placing& p, const double* source, double factor, double* panels) SHIFTRIG_REALTIME {
+    constexpr int four = 4;  // rows that lie side by side in any panel; blocks are whole fours
+    for (int first = 0; first < p.block_rows; first += four) {
+        const int row = p.top + first;
+        const int height = p.rows - row / panel_rows * panel_rows < panel_rows ? four : panel_rows;
+        double* at = panels + panel_index(p.rows, p.width, row, p.first_column);
+        const double* from = source + first;
+        double scale[four];
+        for (int i = 0; i < four; ++i) scale[i] = factor * p.row_scale[first + i];
+        for (int c = 0; c < p.columns; ++c, at += height, from += p.block_rows) {
+            const double of_column = p.column_scale ? p.column_scale[c] : 1;
+            double values[four];
+            for (int i = 0; i < four; ++i) values[i] = from[i] * scale[i] * of_column;
+            for (int i = 0; i < four; ++i) at[i] = values[i];
+        }
+    }
+}
