@@ -33,14 +33,16 @@ void divide_step(ModelData& m, double reach, int most) {
 // A contact of flanks can be as short as half a period of the lightest motion they allow. The parts of a step have to
 // see it, and its events have to have room. Forces that swing with it (a load that grows with speed) cost a part of turn
 // ωh a phase of order (ωh)⁴, which hundreds of contacts add up: half a radian, not one. Friction that rises with speed is
-// a damper that the step does not take exactly: its parts are to be short against its time constant.
+// a damper that the step does not take exactly: its parts are to be short against its time constant. Such that falls makes
+// a slip grow by that time constant.
 void bound_step(ModelData& m) {
     constexpr int most_for_flanks = 1 << 14, most_for_friction = Description::most_parts;
     m.maximum_events = m.description.maximum_events;
     m.maximum_parts = m.description.maximum_parts;
     for (int k = 0; k < m.pairs; ++k) {
         const PairLaw& law = m.pair_laws[static_cast<std::size_t>(k)];
-        const double rate = law.full_load * steepest_rise(law.friction) *
+        const Steepness steep = steepness(law.friction);
+        const double rate = law.full_load * std::max(steep.rise, steep.fall) *
                             mobility_between(m, m.structure.pairs[static_cast<std::size_t>(k)].links);
         divide_step(m, 4 * rate * m.options.step_size, most_for_friction);
     }

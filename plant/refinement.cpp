@@ -41,6 +41,27 @@ bool takes_forces_amiss(const Work& w, const double* late, double reach, const C
     return (reach * wrong > much && change() > much) || exceeds(w, wrong, force_tolerance);
 }
 
+// Friction that falls as the slip grows lets it grow by itself: what is amiss while it is small grows with it, however little
+// torque that is. Stages that miss more than this share of such a fall do not follow it.
+constexpr double growth_tolerance = 0.01, growing = 1.2;
+
+bool outgrows_stages(const Work& w, const double* late) {
+    const ModelData& m = w.model;
+    if (!w.operators.table.fades && m.tabled_pairs.empty()) return false;
+    const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
+    for (int k = 0; k < m.pairs; ++k) {
+        const double sense = slip_sign(w.contact[k]);
+        if (sense == 0 || !(std::fabs(end.slip[k]) > growing * std::fabs(begin.slip[k]))) continue;
+        // Of the factor: what presses the pair may change as well.
+        const double before = begin.load[k], after = end.load[k];
+        if (!(before > 0 && after > 0)) continue;
+        const double fall = std::max(before, after) * (begin.sliding[k] / before - end.sliding[k] / after);
+        if (fall > rounding * std::fabs(end.f[k]) && std::fabs(end.f[k] - late[k]) > growth_tolerance * fall)
+            return true;
+    }
+    return false;
+}
+
 // Twists (the last coordinates, just before f) half way, exact and by the cubic through both ends: what lies between does
 // not show at the ends.
 bool hides_swing(const Work& w) {
@@ -75,7 +96,8 @@ bool is_dense_coarse(Work& w, const Mode& mode) {
         }
         return moved;
     };
-    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || hides_swing(w);
+    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || outgrows_stages(w, late.f) ||
+           hides_swing(w);
 }
 
 // Along the tree shafts are not exact: the embedded method says how near they are. Where all stand still it says what rounding does.
@@ -106,7 +128,8 @@ bool is_tree_coarse(Work& w, const Mode& mode) {
         m.tree->kernel.spread(t.masses, v.load, m.masses, of_mass);
         return m.kernel.loops.largest(of_mass, m.masses);
     };
-    return swings_between(w, mode) || takes_forces_amiss(w, late, weight * t.liveliness, change);
+    return swings_between(w, mode) || takes_forces_amiss(w, late, weight * t.liveliness, change) ||
+           outgrows_stages(w, late);
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ class Answers {
         const auto* dry = std::get_if<DryFriction>(&clutch.friction);
         if (!dry) return;
         const FrictionLaw law = friction_law(*dry);
-        const double slope = load_from_engagement(law, 1) * steepest_rise(law);
+        const double slope = load_from_engagement(law, 1) * steepness(law).rise;
         const auto links = s_.pairs[static_cast<std::size_t>(s_.pair(clutch.name))].links;
         say("clutch \"" + clutch.name + "\": its friction rises by " + format("%.3g", slope) +
                 " Nm s/rad and so slows its lighter mass within ",

@@ -80,18 +80,20 @@ struct RootSearch {
     double last = std::numeric_limits<double>::quiet_NaN(), at_last = 0;
 
     double size() const { return std::fabs(at_low) + std::fabs(at_high); }
-    // The margin at that place; goes on to the one that follows from it, and so much beyond: by the slope, else by the
-    // secant of the bracket or, where that begins at no margin at all, to its middle.
+    // The margin at that place; goes on to the one that follows from it by the slope, and so much beyond, or else to the
+    // middle of the bracket.
     void tell(double margin, double beyond = 0) {
-        if (std::fabs(place - last) > 0) slope = (margin - at_last) / (place - last);
+        if (std::fabs(place - last) > 0) {
+            slope = (margin - at_last) / (place - last);
+        } else if (slope == 0 && at_low > 1e-12 * size()) {
+            slope = (margin - at_low) / (place - low);
+        }
         last = place;
         at_last = margin;
         (margin > 0 ? low : high) = place;
         (margin > 0 ? at_low : at_high) = margin;
         place = last - at_last / slope + beyond;
-        if (slope < 0 && place > low + instant && place < high) return;
-        const double share = at_low > 1e-12 * size() ? at_low / (at_low - at_high) : 0.5, width = high - low;
-        place = std::clamp(low + share * width + beyond, low + 0.01 * width, low + 0.99 * width);
+        if (!(slope < 0 && place > low + instant && place < high)) place = 0.5 * (low + high);
     }
 };
 
@@ -123,7 +125,7 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
     // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
     // beyond. So too with a pair that lets go at next to no torque: this side of it, it would only lock again.
     const bool by_itself = acts_by_itself(crossing.change), overrun = crossing.change == Change::overrun;
-    const double close_enough = (by_itself ? 1e-2 : overrun ? 1e-3 : 1e-5) * search.size();
+    const double close_enough = (by_itself ? 1e-2 : overrun ? 1e-3 : 1e-6) * search.size();
     const double beyond = (by_itself ? 3e-3 : overrun ? 3e-4 : 0) * (until - done);
     if (!mode.tree) look_ahead(w, mode, crossing, search);
     search.place = std::min(search.place + beyond, until);

@@ -94,19 +94,25 @@ inline double sliding_factor(const FrictionLaw& law, double slip) noexcept {
     return law.base + law.rise * exp(-std::fabs(slip) * law.inverse_speed);
 }
 
-// The steepest rise of that factor over the slip [s/rad]: friction that grows with speed damps, and takes small steps.
-inline double steepest_rise(const FrictionLaw& law) noexcept {
-    double steepest = -law.rise * law.inverse_speed;
-    if (law.factor_over_slip != nullptr) {
-        const Table& table = *law.factor_over_slip;
-        for (std::size_t i = 1; i < table.size(); ++i) {
-            const double slope =
-                (table[i].second - table[i - 1].second) / (table[i].first - table[i - 1].first);
-            steepest = i == 1 ? slope : std::fmax(steepest, slope);
-        }
-        if (table.size() < 2) steepest = 0;
+// How steeply that factor rises and falls over the slip, at most [s/rad]: friction that grows with speed damps, and such
+// that fades lets a slip grow; both take small steps.
+struct Steepness {
+    double rise = 0, fall = 0;
+};
+inline Steepness steepness(const FrictionLaw& law) noexcept {
+    Steepness most;
+    const auto consider = [&most](double slope) {
+        most.rise = std::fmax(most.rise, slope);
+        most.fall = std::fmax(most.fall, -slope);
+    };
+    if (law.factor_over_slip == nullptr) {
+        consider(-law.rise * law.inverse_speed);
+        return most;
     }
-    return std::fmax(steepest, 0);
+    const Table& table = *law.factor_over_slip;
+    for (std::size_t i = 1; i < table.size(); ++i)
+        consider((table[i].second - table[i - 1].second) / (table[i].first - table[i - 1].first));
+    return most;
 }
 
 inline double sliding_capacity(const FrictionLaw& law, double load, double slip) noexcept {
