@@ -192,16 +192,26 @@ void Rig::take_requests() SHIFTRIG_REALTIME {
     }
 }
 
-void Rig::change_machine(io::ModelFile file) {
-    Setup changed = setup_;
+plant::Model Rig::build_changed(Setup& changed, io::ModelFile file) const {
+    changed = setup_;
     changed.model = std::move(file);
     changed = with_options(std::move(changed));
     plant::Model model = build(changed);
     if (model.state_size() != model_.state_size())
         throw std::invalid_argument(
             "this changes what the machine's state is made of: start the rig anew with it");
+    return model;
+}
+
+void Rig::check_machine(io::ModelFile file) const {
+    Setup changed;
+    (void)build_changed(changed, std::move(file));
+}
+
+void Rig::change_machine(io::ModelFile file) {
+    Setup changed;
+    model_ = build_changed(changed, std::move(file));
     setup_.model = std::move(changed.model);
-    model_ = std::move(model);
     operators_ = plant::Operators(model_);
     scratch_ = plant::Scratch(model_);
 }

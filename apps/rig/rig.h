@@ -105,6 +105,8 @@ class Rig {
     // The same machine with other parameters, from the next tick on; not while the loop runs. Throws InputError, and
     // std::invalid_argument where the parameter changes what the state is made of (a dead time).
     void change_machine(io::ModelFile model);
+    // Throws what change_machine() would throw, and changes nothing; also while the loop runs.
+    void check_machine(io::ModelFile model) const;
     // The modes that a rig of the same machine and step size has met are this one's too; not while the loop runs. Changes no
     // bit of what follows but the count of modes built.
     void take_modes_of(Rig& twin) noexcept { std::swap(operators_, twin.operators_); }
@@ -123,6 +125,7 @@ class Rig {
         int signal;
         double value;
     };
+    plant::Model build_changed(Setup& changed, io::ModelFile model) const;
     void begin();
     void settle(double seconds);
     void take_requests() SHIFTRIG_REALTIME;
