@@ -79,20 +79,14 @@ std::vector<std::string> scenarios() {
     return names;
 }
 
-class EveryScenario : public testing::TestWithParam<std::string> {};
-
-// From its first, second and third quarter to the end, of long ones the first half minute: whatever a scenario does to
-// machine, buses and controller has begun, is going on or is over in one of them.
-TEST_P(EveryScenario, GoesOnFromItsSnapshotsAsIfNothingHadHappened) {
-    Rig whole(setup_for(GetParam()));
-    const double end = std::min(30.0, whole.setup().scenario->duration);
+// A scenario goes on from snapshots at these times [s], in rising order, as it does on its own.
+void expect_same_from(const std::string& scenario, const std::vector<double>& times, double end) {
+    Rig whole(setup_for(scenario));
     rt::LoopSettings loop;
     loop.pace = rt::Pace::free;
     std::vector<std::unique_ptr<Rig>> continued;
-    int quarter = 1;
     while (whole.sim_time() < end) {
-        if (quarter < 4 && whole.sim_time() >= end * 0.25 * quarter) {
-            ++quarter;
+        if (continued.size() < times.size() && whole.sim_time() >= times[continued.size()]) {
             TemporaryFile file(".lcmlog");
             SnapshotTaker taker(whole, 0);
             taker.offer(whole);
@@ -107,11 +101,25 @@ TEST_P(EveryScenario, GoesOnFromItsSnapshotsAsIfNothingHadHappened) {
             ASSERT_NO_FATAL_FAILURE(expect_same_tick(whole, *each));
         }
     }
-    EXPECT_EQ(continued.size(), 3u);
+    EXPECT_EQ(continued.size(), times.size());
+}
+
+class EveryScenario : public testing::TestWithParam<std::string> {};
+
+// From its first, second and third quarter to the end, of long ones the first half minute: whatever a scenario does to
+// machine, buses and controller has begun, is going on or is over in one of them.
+TEST_P(EveryScenario, GoesOnFromItsSnapshotsAsIfNothingHadHappened) {
+    const double end = std::min(30.0, setup_for(GetParam()).scenario->duration);
+    expect_same_from(GetParam(), {0.25 * end, 0.5 * end, 0.75 * end}, end);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenarios, EveryScenario, testing::ValuesIn(scenarios()),
                          [](const auto& each) { return each.param; });
+
+// The controller begins anew in the very tick after its silence, and must do so after a snapshot in between as well.
+TEST(Snapshot, OfTheLastTicksOfASilenceKnowsOfIt) {
+    expect_same_from("silent_controller", {3.998, 3.999, 4, 4.001}, 6);
+}
 
 TEST(Snapshot, OfAnotherMachineIsRefused) {
     TemporaryFile file(".lcmlog");
