@@ -112,6 +112,7 @@ void Rig::settle(double seconds) {
 void Rig::tick() SHIFTRIG_REALTIME {
     const std::int64_t now = sim_time_ns();
     rig_event_count_ = 0;
+    rig_events_not_kept_ = 0;
     buses_.receive(now, signals_);
     timeline_.apply(now, signals_);
     for (const auto& entry : timeline_.begun()) note(RigEventKind::input_set, entry.signal, entry.value);
@@ -229,6 +230,8 @@ void Rig::report_timing(std::int64_t overruns, double load) SHIFTRIG_REALTIME {
 void Rig::note(RigEventKind kind, int signal, double value) SHIFTRIG_REALTIME {
     if (rig_event_count_ < rig_events_.size())
         rig_events_[rig_event_count_++] = {sim_time(), kind, signal, value};
+    else
+        ++rig_events_not_kept_;
 }
 
 bool Rig::wait_for_answer(std::int64_t timeout_ns) {

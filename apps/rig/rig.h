@@ -95,6 +95,7 @@ class Rig {
     std::span<const plant::Event> plant_events() const noexcept { return {events_.data(), event_count_}; }
     int plant_events_not_kept() const noexcept { return events_not_kept_; }
     std::span<const RigEvent> rig_events() const noexcept { return {rig_events_.data(), rig_event_count_}; }
+    int rig_events_not_kept() const noexcept { return rig_events_not_kept_; }
     const plant::Certificate& certificate() const noexcept {
         return certificate_;
     }  // worst and sums over the substeps
@@ -156,8 +157,9 @@ class Rig {
     std::array<plant::Event, plant::Outputs::event_capacity> events_;
     std::size_t event_count_ = 0;
     int events_not_kept_ = 0;
-    std::array<RigEvent, 32> rig_events_;
+    std::array<RigEvent, 256> rig_events_;  // more than a scenario does at once, or all messages of a bus
     std::size_t rig_event_count_ = 0;
+    int rig_events_not_kept_ = 0;
     plant::Certificate certificate_;
     std::vector<int> statuses_;  // signals `bus.<message>.status`
     std::vector<double> last_status_;

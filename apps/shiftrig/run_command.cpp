@@ -273,6 +273,8 @@ int run(const RunOptions& options) {
     if (beside.collector->ticks_left_out() > 0)
         std::cerr << "shifts are judged without the last " << beside.collector->ticks_left_out()
                   << " ticks, which did not fit the memory\n";
+    if (beside.collector->events_left_out() > 0)
+        std::cerr << beside.collector->events_left_out() << " events are not told: they did not fit\n";
 
     const auto& report = session.report();
     const analysis::Run collected = beside.collector->finish(rig);
@@ -288,9 +290,7 @@ int run(const RunOptions& options) {
     } else {
         print_summary(rig, session, dissipated_before, scorecard);
     }
-    const bool ended_well =
-        report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped;
-    return whole && ended_well && session.certificate().is_finite() ? good : failed;
+    return whole && gave_up(report).empty() && session.certificate().is_finite() ? good : failed;
 }
 
 Command::Run declare(CLI::App& app) {

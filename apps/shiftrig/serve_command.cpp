@@ -89,9 +89,7 @@ int run(const Options& options) {
         std::cerr << "this machine does not grant " << rt::to_string(refusal) << '\n';
     for (const auto& line : rig.buses().summary()) std::cerr << line << '\n';
     std::cout << describe(report);
-    const bool ended_well =
-        report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped;
-    return ended_well && dashboard.sound() ? good : failed;
+    return gave_up(report).empty() && dashboard.sound() ? good : failed;
 }
 
 Command::Run declare(CLI::App& app) {

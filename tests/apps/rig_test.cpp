@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "apps/rig/choices.h"
+#include "apps/rig/collector.h"
 #include "apps/rig/rehearsal.h"
 #include "apps/rig/scenario_run.h"
 
@@ -234,6 +235,28 @@ TEST(Rig, CertificateOfARunKeepsTheWorstAndCountsTheTicksOfEachFlag) {
     run.take(tick);
     EXPECT_FALSE(run.is_finite());
     EXPECT_EQ(run.ticks, 3);
+}
+
+// A `must_not` says nothing about events that were dropped, so every one is counted.
+TEST(Rig, EventsThatDoNotFitATickOrTheCollectorAreCounted) {
+    std::string text = std::string(ploughing_in_f2) + "duration_s: 1\ntimeline:\n";
+    for (int i = 0; i < 300; ++i) text += "  - {at_s: 0.005, driver.throttle: 0.7}\n";
+    Rig rig(make_setup({}, inline_scenario(text)));
+    CollectorOptions little;
+    little.most_events = 100;
+    Collector roomy(rig, 20), small(rig, 20, little);
+    std::int64_t told = 0, not_kept = 0;
+    for (int i = 0; i < 20; ++i) {
+        rig.tick();
+        roomy.take(rig);
+        small.take(rig);
+        told += static_cast<std::int64_t>(rig.rig_events().size());
+        not_kept += rig.rig_events_not_kept();
+    }
+    EXPECT_GE(told, 256);
+    EXPECT_EQ(not_kept, 300 - 256);
+    EXPECT_EQ(roomy.events_left_out(), not_kept);
+    EXPECT_EQ(small.events_left_out(), not_kept + told - 100);
 }
 
 TEST(Rig, ScenarioThatSetsAnOutputIsRefusedWithItsPlace) {
