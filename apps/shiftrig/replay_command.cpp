@@ -91,6 +91,8 @@ void print(const io::RecordingReader& reader, const io::ReplayResult& result, co
         std::printf("%lld ticks are missing in the recording; %lld could not be compared for that\n",
                     static_cast<long long>(result.lost),
                     static_cast<long long>(result.ticks - result.compared));
+    else if (result.compared == 0)
+        std::printf("that proves nothing\n");
 }
 
 int run_on(io::RecordingReader& reader, const Options& options) {
@@ -117,7 +119,7 @@ int run_on(io::RecordingReader& reader, const Options& options) {
         std::cerr << reader.complaint() << '\n';
         return bad_input;
     }
-    return good;
+    return result.agrees() || other_model ? good : failed;
 }
 
 // Data of a real machine: a table, or the log of its bus as the model's stanza `can:` understands it.

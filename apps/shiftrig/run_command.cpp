@@ -181,8 +181,8 @@ bool finish(const RunOptions& options, Beside& beside) {
     bool whole = true;
     if (beside.recording) {
         beside.recorded = beside.recording->end();
-        whole = beside.recorded.error.empty();
-        if (!whole) std::cerr << beside.recorded.error << '\n';
+        whole = beside.recorded.error.empty() && beside.recorded.lost == 0;
+        if (!beside.recorded.error.empty()) std::cerr << beside.recorded.error << '\n';
         if (beside.recorded.lost > 0)
             std::cerr << beside.recording_path << ": " << beside.recorded.lost
                       << " ticks were not kept: the disk did not keep up\n";
