@@ -131,6 +131,7 @@ class Rig {
     void settle(double seconds);
     void take_requests() SHIFTRIG_REALTIME;
     void copy_inputs() SHIFTRIG_REALTIME;
+    double limited(int signal, const std::pair<double, double>& range, double last) SHIFTRIG_REALTIME;
     void watch_the_controller(std::int64_t now_ns) SHIFTRIG_REALTIME;
     void step_plant() SHIFTRIG_REALTIME;
     void publish() SHIFTRIG_REALTIME;
@@ -146,7 +147,8 @@ class Rig {
     RigSignals own_{};
     io::SignalTable signals_;
     std::vector<bool> settable_;                     // by signal
-    std::vector<std::pair<double, double>> ranges_;  // of the inputs
+    std::vector<std::pair<double, double>> ranges_;  // of the inputs, then of what is the driver's
+    std::array<double, 4> driver_{};                 // his signals as they act, in the order of RigSignals
     int pedal_release_ = -1, service_brake_ = -1;    // inputs
     Timeline timeline_;
     Buses buses_;

@@ -205,6 +205,36 @@ TEST(Rig, CommandThatIsNoNumberOrOutOfRangeIsLimitedAndNoted) {
     EXPECT_FALSE(rig.request(rig.signals().find("mass.vehicle.speed"), 1)) << "an output was set";
 }
 
+// The driver's signals act within their ranges as well: the plant limits what it is given, and the recording would tell
+// another story.
+TEST(Rig, DriverOutOfHisRangeIsLimitedAndNoted) {
+    Choices choices;
+    choices.controller = "none";
+    Rig rig(make_setup(choices, inline_scenario(std::string(ploughing_in_f2) + "duration_s: 1\n")));
+    const auto index = [&](const char* name) { return rig.signals().find(name); };
+    const auto expect_limited = [&](const char* name, double wanted, double acts) {
+        const double before = rig.value(index("rig.limited_inputs"));
+        ASSERT_TRUE(rig.request(index(name), wanted)) << name;
+        rig.tick();
+        EXPECT_EQ(rig.value(index(name)), acts) << name;
+        EXPECT_EQ(rig.value(index("rig.limited_inputs")), before + 1) << name;
+        ASSERT_EQ(rig.rig_events().size(), 2U) << name;
+        EXPECT_EQ(rig.rig_events()[1].kind, RigEventKind::input_limited) << name;
+        EXPECT_EQ(rig.rig_events()[1].signal, index(name));
+        rig.tick();
+        EXPECT_EQ(rig.value(index(name)), acts) << name;
+        EXPECT_EQ(rig.value(index("rig.limited_inputs")), before + 1) << name << " is noted once";
+    };
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    expect_limited("driver.lever", 500, 99);
+    expect_limited("driver.lever", nan, 99);
+    expect_limited("driver.auto", -1, 0);
+    expect_limited("driver.parking_brake", 2, 1);
+    expect_limited("driver.clutch_pedal", 5, 1);
+    EXPECT_EQ(rig.value(index("clutch.Fc.release_command")), 1);
+    expect_limited("driver.clutch_pedal", -std::numeric_limits<double>::infinity(), 0);
+}
+
 TEST(Rig, PedalReleasesTheMainClutchWhateverTheControllerSays) {
     const auto result = run_scenario(
         inline_scenario(std::string(ploughing_in_f2) +
