@@ -222,6 +222,30 @@ class Results(InAFolder):
                                       '"b" at 4 rad/s instead of 0\n')
         self.assertAlmostEqual(json.loads(done.stdout)["final"]["mass.a.speed_rad_s"], 8, 12)
 
+    def test_ticks_that_the_disk_did_not_take_are_not_proven(self):
+        """A minute at fifty times real time, into a pipe that nobody reads for a while."""
+        pipe, recording = self.path("pipe"), self.path("shift.lcmlog")
+        os.mkfifo(pipe)
+
+        def read_late():
+            with open(pipe, "rb") as source, open(recording, "wb") as file:
+                file.write(source.read(1 << 20))
+                time.sleep(3)
+                shutil.copyfileobj(source, file)
+
+        reader = threading.Thread(target=read_late)
+        reader.start()
+        done = run("--scenario", SHIFT, "--duration", "60", "--factor", "50", "--catch-up", "100000", "--record", pipe)
+        reader.join()
+        self.assertRegex(done.stderr, r"pipe: \d+ ticks were not kept: the disk did not keep up\n")
+        self.assertEqual(done.returncode, 1)
+        lost = int(re.search(r"pipe: (\d+) ticks", done.stderr).group(1))
+        replayed = subprocess.run([SHIFTRIG, "replay", recording], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(replayed.returncode, 1, replayed.stderr + replayed.stdout)
+        self.assertRegex(replayed.stdout, r"ticks agree bit for bit \(kernel \w+\)\n%d ticks are missing in the recording; " % lost)
+        found = subprocess.run([SHIFTRIG, "replay", recording, "--json"], stdout=subprocess.PIPE, text=True)
+        self.assertEqual((found.returncode, json.loads(found.stdout)["agrees"], json.loads(found.stdout)["lost"]), (1, False, lost))
+
     def test_csv_has_every_tick_and_names_with_units(self):
         path = self.path("shift.csv")
         result = free("--csv", path)
@@ -260,30 +284,6 @@ class Results(InAFolder):
         self.assertEqual(replayed.returncode, 0, replayed.stderr + replayed.stdout)
         with open(trace) as file:
             self.assert_chrome_trace(json.load(file), ticks=6000)
-
-    def test_ticks_that_the_disk_did_not_take_are_not_proven(self):
-        """A minute at fifty times real time, into a pipe that nobody reads for a while."""
-        pipe, recording = self.path("pipe"), self.path("shift.lcmlog")
-        os.mkfifo(pipe)
-
-        def read_late():
-            with open(pipe, "rb") as source, open(recording, "wb") as file:
-                file.write(source.read(1 << 20))
-                time.sleep(3)
-                shutil.copyfileobj(source, file)
-
-        reader = threading.Thread(target=read_late)
-        reader.start()
-        done = run("--scenario", SHIFT, "--duration", "60", "--factor", "50", "--catch-up", "100000", "--record", pipe)
-        reader.join()
-        self.assertRegex(done.stderr, r"pipe: \d+ ticks were not kept: the disk did not keep up\n")
-        self.assertEqual(done.returncode, 1)
-        lost = int(re.search(r"pipe: (\d+) ticks", done.stderr).group(1))
-        replayed = subprocess.run([SHIFTRIG, "replay", recording], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.assertEqual(replayed.returncode, 1, replayed.stderr + replayed.stdout)
-        self.assertRegex(replayed.stdout, r"ticks agree bit for bit \(kernel \w+\)\n%d ticks are missing in the recording; " % lost)
-        found = subprocess.run([SHIFTRIG, "replay", recording, "--json"], stdout=subprocess.PIPE, text=True)
-        self.assertEqual((found.returncode, json.loads(found.stdout)["agrees"], json.loads(found.stdout)["lost"]), (1, False, lost))
 
     # The Trace Event Format as chrome://tracing and ui.perfetto.dev read it.
     def assert_chrome_trace(self, trace, ticks):
