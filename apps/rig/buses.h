@@ -47,6 +47,7 @@ class Buses {
         if (wire_) wire_->archive(a);
         for (auto& each : buses_) each.archive(a);
         if (node_) node_->archive(a);
+        a(silent_);
     }
 
     bool any() const noexcept { return !buses_.empty(); }

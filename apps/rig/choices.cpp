@@ -97,7 +97,6 @@ void choose_controller(const Choices& choices, Setup& setup) {
     const bool logs = !choices.can_log.empty() || !choices.can_replay.empty();
     const bool needs_a_bus = is_built_in(controller) || (logs && buses.names.empty());
     if (needs_a_bus && !inprocess_given()) buses.names.push_back("inprocess");
-    buses.silences = scripted.silences;
     if (!is_built_in(controller)) return;
     const std::string given = controller.size() > 8 ? controller.substr(8) : scripted.calibration;
     buses.calibration_path = given.empty() ? shipped_calibration() : given;
@@ -112,15 +111,19 @@ Setup complete(const Choices& choices, Setup setup) {
     setup.buses.lockstep = choices.lockstep;
     setup.buses.can_log = choices.can_log;
     setup.buses.can_replay = choices.can_replay;
-    if (setup.scenario && setup.scenario->bus_faults.IsDefined()) {
-        setup.buses.faults = setup.scenario->bus_faults;
-        setup.buses.faults_file = setup.scenario->path;
-    }
+    if (setup.scenario) follow_scenario(*setup.scenario, setup.buses);
     choose_controller(choices, setup);
     return setup;
 }
 
 }  // namespace
+
+void follow_scenario(const io::ScenarioFile& scenario, BusSetup& buses) {
+    buses.silences = read_controller(scenario).silences;
+    if (!scenario.bus_faults.IsDefined()) return;
+    buses.faults = scenario.bus_faults;
+    buses.faults_file = scenario.path;
+}
 
 std::string shipped_calibration() {
     return SHIFTRIG_CONFIG "/calibration/tractor.yaml";

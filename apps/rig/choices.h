@@ -25,6 +25,10 @@ Setup make_setup(const Choices& choices);
 // The same for a scenario in memory (choices.scenario is not looked at).
 Setup make_setup(const Choices& choices, io::ScenarioFile scenario);
 
+// What a scenario does to the buses: their faults, and when the built-in controller is silent. Part of make_setup. Throws
+// InputError.
+void follow_scenario(const io::ScenarioFile& scenario, BusSetup& buses);
+
 // The calibration of the built-in controller where nobody names another: a file.
 std::string shipped_calibration();
 

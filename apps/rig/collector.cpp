@@ -65,7 +65,7 @@ void Collector::take(const Rig& rig) SHIFTRIG_REALTIME {
     } else {
         ++left_out_;
     }
-    events_left_out_ += rig.plant_events_not_kept();
+    events_left_out_ += rig.plant_events_not_kept() + rig.rig_events_not_kept();
     for (const auto& event : rig.plant_events()) events_left_out_ += !keep(plant_events_, event);
     for (const auto& event : rig.rig_events()) events_left_out_ += !keep(rig_events_, event);
 }

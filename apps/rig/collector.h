@@ -30,6 +30,7 @@ class Collector {
     // Everything taken so far, events in words; to be called once, after the run.
     analysis::Run finish(const Rig& rig);
     std::int64_t ticks_left_out() const noexcept { return left_out_; }
+    // Of the plant and of the rig, whether a tick had no room for them or the collector.
     std::int64_t events_left_out() const noexcept { return events_left_out_; }
 
   private:

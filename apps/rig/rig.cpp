@@ -39,6 +39,10 @@ io::SignalTable table_of(const plant::Model& model, RigSignals& own) {
     return signals;
 }
 
+std::array<int, 4> driver_signals(const RigSignals& own) SHIFTRIG_REALTIME {
+    return {own.lever, own.clutch_pedal, own.parking_brake, own.automatic};
+}
+
 // Inputs, and what belongs to the driver.
 std::vector<bool> settable(const plant::Model& model, const io::SignalTable& signals) {
     std::vector<bool> result(static_cast<std::size_t>(signals.size()), false);
@@ -63,7 +67,9 @@ Rig::Rig(Setup setup)
       buses_(setup_.buses, setup_.model, setup_.tick_ns, signals_),
       safe_commands_(setup_.model, model_) {
     settable_.resize(static_cast<std::size_t>(signals_.size()), false);  // what the buses added is not
-    for (const auto& input : model_.inputs()) ranges_.emplace_back(input.minimum, input.maximum);
+    const auto add_range = [this](const plant::Signal& s) { ranges_.emplace_back(s.minimum, s.maximum); };
+    for (const auto& input : model_.inputs()) add_range(input);
+    for (const int signal : driver_signals(own_)) add_range(signals_.signal(signal));
     const auto& side = setup_.model.controller;
     if (!side.pedal_clutch.empty())
         pedal_release_ = model_.input("clutch." + side.pedal_clutch + ".release_command");
@@ -112,6 +118,7 @@ void Rig::settle(double seconds) {
 void Rig::tick() SHIFTRIG_REALTIME {
     const std::int64_t now = sim_time_ns();
     rig_event_count_ = 0;
+    rig_events_not_kept_ = 0;
     buses_.receive(now, signals_);
     timeline_.apply(now, signals_);
     for (const auto& entry : timeline_.begun()) note(RigEventKind::input_set, entry.signal, entry.value);
@@ -126,19 +133,12 @@ void Rig::tick() SHIFTRIG_REALTIME {
 
 // The table holds what scenario, driver and controller want; the plant gets what is possible.
 void Rig::copy_inputs() SHIFTRIG_REALTIME {
-    for (std::size_t i = 0; i < inputs_.value.size(); ++i) {
-        const double wanted = signals_.value[i];
-        const auto& range = ranges_[i];
-        const double given = std::clamp(wanted, range.first, range.second);
-        if (given == wanted) {
-            inputs_.value[i] = wanted;
-            continue;
-        }
-        if (!std::isnan(wanted)) inputs_.value[i] = given;  // not a number: the last one stays
-        signals_.value[i] = inputs_.value[i];               // noted once
-        signals_.value[static_cast<std::size_t>(own_.limited_inputs)] += 1;
-        note(RigEventKind::input_limited, static_cast<int>(i), wanted);
-    }
+    const std::size_t inputs = inputs_.value.size();
+    for (std::size_t i = 0; i < inputs; ++i)
+        inputs_.value[i] = limited(static_cast<int>(i), ranges_[i], inputs_.value[i]);
+    const auto driver = driver_signals(own_);
+    for (std::size_t i = 0; i < driver.size(); ++i)
+        driver_[i] = limited(driver[i], ranges_[inputs + i], driver_[i]);
     const auto value = [&](int signal) { return signals_.value[static_cast<std::size_t>(signal)]; };
     if (pedal_release_ >= 0) {
         double& release = inputs_.value[static_cast<std::size_t>(pedal_release_)];
@@ -146,6 +146,16 @@ void Rig::copy_inputs() SHIFTRIG_REALTIME {
     }
     if (service_brake_ >= 0 && value(own_.parking_brake) > 0.5)
         inputs_.value[static_cast<std::size_t>(service_brake_)] = 1;
+}
+
+// What is wanted of a signal, within its range; `last` where it is not a number. Said once: from then on it is wanted so.
+double Rig::limited(int signal, const std::pair<double, double>& range, double last) SHIFTRIG_REALTIME {
+    double& wanted = signals_.value[static_cast<std::size_t>(signal)];
+    const double given = std::clamp(wanted, range.first, range.second);
+    if (given == wanted) return wanted;
+    note(RigEventKind::input_limited, signal, wanted);
+    signals_.value[static_cast<std::size_t>(own_.limited_inputs)] += 1;
+    return wanted = std::isnan(wanted) ? last : given;
 }
 
 void Rig::watch_the_controller(std::int64_t now_ns) SHIFTRIG_REALTIME {
@@ -192,16 +202,26 @@ void Rig::take_requests() SHIFTRIG_REALTIME {
     }
 }
 
-void Rig::change_machine(io::ModelFile file) {
-    Setup changed = setup_;
+plant::Model Rig::build_changed(Setup& changed, io::ModelFile file) const {
+    changed = setup_;
     changed.model = std::move(file);
     changed = with_options(std::move(changed));
     plant::Model model = build(changed);
     if (model.state_size() != model_.state_size())
         throw std::invalid_argument(
             "this changes what the machine's state is made of: start the rig anew with it");
+    return model;
+}
+
+void Rig::check_machine(io::ModelFile file) const {
+    Setup changed;
+    (void)build_changed(changed, std::move(file));
+}
+
+void Rig::change_machine(io::ModelFile file) {
+    Setup changed;
+    model_ = build_changed(changed, std::move(file));
     setup_.model = std::move(changed.model);
-    model_ = std::move(model);
     operators_ = plant::Operators(model_);
     scratch_ = plant::Scratch(model_);
 }
@@ -219,6 +239,8 @@ void Rig::report_timing(std::int64_t overruns, double load) SHIFTRIG_REALTIME {
 void Rig::note(RigEventKind kind, int signal, double value) SHIFTRIG_REALTIME {
     if (rig_event_count_ < rig_events_.size())
         rig_events_[rig_event_count_++] = {sim_time(), kind, signal, value};
+    else
+        ++rig_events_not_kept_;
 }
 
 bool Rig::wait_for_answer(std::int64_t timeout_ns) {
@@ -237,7 +259,7 @@ std::vector<plant::Signal> Rig::rig_signals() const {
 }
 
 void Rig::archive(io::Archive& a) {
-    a(ticks_, state_.block, inputs_.value, outputs_.value, signals_.value, last_status_);
+    a(ticks_, state_.block, inputs_.value, outputs_.value, signals_.value, driver_, last_status_);
     timeline_.archive(a);
     safe_commands_.archive(a);
     buses_.archive(a);

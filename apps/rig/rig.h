@@ -95,6 +95,7 @@ class Rig {
     std::span<const plant::Event> plant_events() const noexcept { return {events_.data(), event_count_}; }
     int plant_events_not_kept() const noexcept { return events_not_kept_; }
     std::span<const RigEvent> rig_events() const noexcept { return {rig_events_.data(), rig_event_count_}; }
+    int rig_events_not_kept() const noexcept { return rig_events_not_kept_; }
     const plant::Certificate& certificate() const noexcept {
         return certificate_;
     }  // worst and sums over the substeps
@@ -105,6 +106,8 @@ class Rig {
     // The same machine with other parameters, from the next tick on; not while the loop runs. Throws InputError, and
     // std::invalid_argument where the parameter changes what the state is made of (a dead time).
     void change_machine(io::ModelFile model);
+    // Throws what change_machine() would throw, and changes nothing; also while the loop runs.
+    void check_machine(io::ModelFile model) const;
     // The modes that a rig of the same machine and step size has met are this one's too; not while the loop runs. Changes no
     // bit of what follows but the count of modes built.
     void take_modes_of(Rig& twin) noexcept { std::swap(operators_, twin.operators_); }
@@ -123,10 +126,12 @@ class Rig {
         int signal;
         double value;
     };
+    plant::Model build_changed(Setup& changed, io::ModelFile model) const;
     void begin();
     void settle(double seconds);
     void take_requests() SHIFTRIG_REALTIME;
     void copy_inputs() SHIFTRIG_REALTIME;
+    double limited(int signal, const std::pair<double, double>& range, double last) SHIFTRIG_REALTIME;
     void watch_the_controller(std::int64_t now_ns) SHIFTRIG_REALTIME;
     void step_plant() SHIFTRIG_REALTIME;
     void publish() SHIFTRIG_REALTIME;
@@ -142,7 +147,8 @@ class Rig {
     RigSignals own_{};
     io::SignalTable signals_;
     std::vector<bool> settable_;                     // by signal
-    std::vector<std::pair<double, double>> ranges_;  // of the inputs
+    std::vector<std::pair<double, double>> ranges_;  // of the inputs, then of what is the driver's
+    std::array<double, 4> driver_{};                 // his signals as they act, in the order of RigSignals
     int pedal_release_ = -1, service_brake_ = -1;    // inputs
     Timeline timeline_;
     Buses buses_;
@@ -153,8 +159,9 @@ class Rig {
     std::array<plant::Event, plant::Outputs::event_capacity> events_;
     std::size_t event_count_ = 0;
     int events_not_kept_ = 0;
-    std::array<RigEvent, 32> rig_events_;
+    std::array<RigEvent, 256> rig_events_;  // more than a scenario does at once, or all messages of a bus
     std::size_t rig_event_count_ = 0;
+    int rig_events_not_kept_ = 0;
     plant::Certificate certificate_;
     std::vector<int> statuses_;  // signals `bus.<message>.status`
     std::vector<double> last_status_;

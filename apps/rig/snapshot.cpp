@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "analysis/scorecard.h"
+#include "apps/rig/choices.h"
 #include "apps/rig/session.h"
 #include "io/recording/rebuild.h"
 #include "io/recording/snapshot.h"
@@ -81,6 +82,7 @@ Setup setup_of(const io::Manifest& snapshot) {
         const auto found = snapshot.facts.find(name);
         return found == snapshot.facts.end() ? std::string() : found->second;
     };
+    if (setup.scenario) follow_scenario(*setup.scenario, setup.buses);
     std::istringstream buses(fact("buses"));
     for (std::string name; buses >> name;) setup.buses.names.push_back(name);
     setup.buses.lockstep = fact("pace") == "lockstep";

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "analysis/report/shift_page.h"
 #include "apps/rig/variation.h"
@@ -27,6 +29,12 @@ std::string number_in(const json& body, const char* key, double& value) {
     return std::isfinite(value) ? "" : std::string("\"") + key + "\" must be finite";
 }
 
+io::ModelFile with_parameter(const io::ModelFile& present, const std::string& name, double value) {
+    rig::YamlVariant variant(present.text, present.path);
+    variant.set(name, value, false);
+    return io::parse_model(variant.text(), present.path);
+}
+
 }  // namespace
 
 Dashboard::Dashboard(rig::Rig& rig, DashboardOptions options) : rig_(rig), options_(std::move(options)) {
@@ -39,11 +47,20 @@ Dashboard::Dashboard(rig::Rig& rig, DashboardOptions options) : rig_(rig), optio
     limp_ = table.find("controller.limp");
     recent_.machine = rig.model().description();
     factor_ = options_.loop.factor;
+    to_record_ = options_.record_at_once;
     http_ = std::make_unique<HttpServer>(
         options_.http, feed_,
         Handlers{[this] { return model_json(); },
                  [this](std::string_view verb, const std::string& body) { return command(verb, body); },
                  [this] { return recording(); }});
+    // After the port is ours: who has it may be writing this very file.
+    try {
+        const std::lock_guard lock(mutex_);
+        if (to_record_) recording_ = std::make_unique<io::RecordingWriter>(next_recording());
+    } catch (...) {
+        http_.reset();  // its threads look at what would be gone before them
+        throw;
+    }
     feeder_ = std::thread([this] { feed(); });
 }
 
@@ -57,45 +74,108 @@ Dashboard::~Dashboard() {
 
 rt::LoopReport Dashboard::run() {
     rt::LoopReport report;
-    if (options_.record_at_once) (void)command("record", R"({"active":true})");
     auto slots_left = options_.loop.slots;
-    while (!stopping_ && slots_left > 0) {
-        {
-            const std::lock_guard lock(mutex_);
-            for (auto& what : waiting_) what();
-            waiting_.clear();
-        }
-        rig::SessionOptions session_options;
-        session_options.loop = options_.loop;
-        session_options.loop.slots = slots_left;
-        session_options.recording = recording_.get();
-        session_options.after = [this](rig::Rig& each, const rt::Tick&) { take(each); };
-        rig::Session session(rig_, std::move(session_options));
-        {
-            const std::lock_guard lock(mutex_);
-            if (paused_) session.control().pause();
-            session.control().set_factor(factor_);
-            control_ = &session.control();
-            if (stopping_ || !waiting_.empty()) session.control().stop();
-        }
-        report = session.run();
-        control_ = nullptr;
+    do {
+        report = run_stretch(slots_left);
         slots_left -= report.executed + report.skipped;
-    }
-    const std::lock_guard lock(mutex_);
-    if (recording_) recording_->end();
+        // A stretch ends early for stop(), for what waits, or because the loop gave up: only what waits goes on.
+    } while (report.outcome == rt::Outcome::stopped && !stopping_);
     return report;
 }
 
-void Dashboard::stop() noexcept {
+rt::LoopReport Dashboard::run_stretch(std::int64_t slots) {
+    std::optional<rig::Session> session;
+    {
+        const std::lock_guard lock(mutex_);
+        for (auto& what : waiting_) what();
+        waiting_.clear();
+        rig::SessionOptions options;
+        options.loop = options_.loop;
+        options.loop.slots = slots;
+        options.after = [this](rig::Rig& each, const rt::Tick&) { take(each); };
+        if (to_record_ && !recording_) begin_recording();
+        options.recording = recording_.get();
+        try {
+            session.emplace(rig_, options);
+        } catch (const io::RecordingError&) {  // its beginning does not fit the disk any more
+            end_recording();
+            options.recording = nullptr;
+            session.emplace(rig_, options);
+        }
+        if (paused_) session->control().pause();
+        session->control().set_factor(factor_);
+        if (stopping_) session->control().stop();
+        control_ = &session->control();
+    }
+    const rt::LoopReport report = session->run();
+    const std::lock_guard lock(mutex_);
+    control_ = nullptr;
+    if (!session->certificate().is_finite()) sound_ = false;
+    end_recording();
+    return report;
+}
+
+void Dashboard::stop() {
     stopping_ = true;
-    if (auto* control = control_.load()) control->stop();
+    const std::lock_guard lock(mutex_);
+    if (control_) control_->stop();
 }
 
 void Dashboard::between_stretches(std::function<void()> what) {
     const std::lock_guard lock(mutex_);
     waiting_.push_back(std::move(what));
-    if (auto* control = control_.load()) control->stop();
+    if (control_) control_->stop();
+}
+
+// Each recording is a file of its own: shiftrig.lcmlog, shiftrig-2.lcmlog, …
+const std::string& Dashboard::next_recording() {
+    const std::filesystem::path path(options_.record_path);
+    recorded_to_ = options_.record_path;
+    if (recordings_++ > 0)
+        recorded_to_ = path.parent_path() /
+                       (path.stem().string() + "-" + std::to_string(recordings_) + path.extension().string());
+    return recorded_to_;
+}
+
+void Dashboard::begin_recording() {
+    try {
+        recording_ = std::make_unique<io::RecordingWriter>(next_recording());
+        tell("t=" + std::to_string(rig_.sim_time()) + " recording to " + recorded_to_);
+    } catch (const io::RecordingError& error) {
+        sound_ = false;
+        tell_trouble(error.what());
+    }
+}
+
+void Dashboard::end_recording() {
+    if (!recording_) return;
+    const io::RecordingSummary summary = recording_->end();
+    recording_.reset();
+    if (!summary.error.empty()) tell_trouble(summary.error);
+    if (summary.lost > 0)
+        tell_trouble(recorded_to_ + ": " + std::to_string(summary.lost) +
+                     " ticks were not kept: the disk did not keep up");
+    if (!summary.error.empty() || summary.lost > 0) sound_ = false;
+}
+
+void Dashboard::set_parameter(const std::string& name, double value) {
+    try {
+        rig_.change_machine(with_parameter(rig_.setup().model, name, value));
+    } catch (const std::exception& error) {
+        return tell(error.what());
+    }
+    char number[32];
+    std::snprintf(number, sizeof number, "%.6g", value);
+    tell("t=" + std::to_string(rig_.sim_time()) + " " + name + " is set to " + number);
+}
+
+void Dashboard::tell(const std::string& text) {
+    feed_.change("change", json{{"text", text}}.dump());
+}
+
+void Dashboard::tell_trouble(const std::string& text) {
+    tell(text);
+    std::cerr << text << '\n';
 }
 
 // ---- in the loop ----------------------------------------------------------------------------------------
@@ -206,6 +286,20 @@ std::string Dashboard::model_json() const {
     return machine_page(rig_).dump();
 }
 
+// Why a parameter cannot have this value; asked before the run is interrupted for it.
+std::string Dashboard::refusal(const std::string& name, double value) const {
+    const std::lock_guard lock(mutex_);
+    const auto all = parameters_of(rig_.model().description());
+    if (std::none_of(all.begin(), all.end(), [&](const Parameter& p) { return p.name == name; }))
+        return "there is no parameter \"" + name + "\"";
+    try {
+        rig_.check_machine(with_parameter(rig_.setup().model, name, value));
+    } catch (const std::exception& error) {
+        return error.what();
+    }
+    return "";
+}
+
 std::string Dashboard::command(std::string_view verb, const std::string& text) {
     const json body = json::parse(text, nullptr, false);
     if (!body.is_object()) return "a command is a JSON object";
@@ -222,13 +316,12 @@ std::string Dashboard::command(std::string_view verb, const std::string& text) {
         if (!body.contains("name") || !body["name"].is_string()) return "\"name\" must be a fault";
         if (!body.contains("active") || !body["active"].is_boolean())
             return "\"active\" must be true or false";
+        const std::lock_guard lock(mutex_);
         for (const auto& fault : faults_of(rig_))
-            if (fault.name == body["name"].get<std::string>()) {
-                const std::lock_guard lock(mutex_);
+            if (fault.name == body["name"].get<std::string>())
                 return rig_.request(fault.signal, body["active"].get<bool>() ? fault.active : fault.healthy)
                            ? ""
                            : "the rig is busy, try again";
-            }
         return "there is no such fault";
     }
     if (verb == "pause") {
@@ -236,13 +329,13 @@ std::string Dashboard::command(std::string_view verb, const std::string& text) {
             return "\"paused\" must be true or false";
         const std::lock_guard lock(mutex_);
         paused_ = body["paused"].get<bool>();
-        if (auto* control = control_.load()) paused_ ? control->pause() : control->resume();
+        if (control_) paused_ ? control_->pause() : control_->resume();
         return "";
     }
     if (verb == "step") {
         const std::lock_guard lock(mutex_);
         if (!paused_) return "pause first";
-        if (auto* control = control_.load()) control->single_step();
+        if (control_) control_->single_step();
         return "";
     }
     if (verb == "speed") {
@@ -250,75 +343,25 @@ std::string Dashboard::command(std::string_view verb, const std::string& text) {
         if (!(value >= 0.001 && value <= 10)) return "\"factor\" must be from 0.001 to 10";
         const std::lock_guard lock(mutex_);
         factor_ = value;
-        if (auto* control = control_.load()) control->set_factor(value);
+        if (control_) control_->set_factor(value);
         return "";
     }
     if (verb == "record") {
         if (!body.contains("active") || !body["active"].is_boolean())
             return "\"active\" must be true or false";
         const bool active = body["active"].get<bool>();
-        between_stretches([this, active] {
-            if (recording_) recording_->end();
-            recording_.reset();
-            if (active) begin_recording();
-        });
+        between_stretches([this, active] { to_record_ = active; });
         return "";
     }
     if (verb == "parameter") {
         if (!body.contains("name") || !body["name"].is_string()) return "\"name\" must be a parameter";
         if (auto wrong = number_in(body, "value", value); !wrong.empty()) return wrong;
         const std::string name = body["name"].get<std::string>();
-        std::vector<Parameter> all;
-        {
-            const std::lock_guard lock(mutex_);
-            all = parameters_of(rig_.model().description());
-        }
-        if (std::none_of(all.begin(), all.end(), [&](const Parameter& p) { return p.name == name; }))
-            return "there is no parameter \"" + name + "\"";
+        if (auto wrong = refusal(name, value); !wrong.empty()) return wrong;
         between_stretches([this, name, value] { set_parameter(name, value); });
         return "";
     }
     return "there is no command \"" + std::string(verb) + "\"";
-}
-
-// Each recording is a file of its own: shiftrig.lcmlog, shiftrig-2.lcmlog, …
-void Dashboard::begin_recording() {
-    const std::filesystem::path path(options_.record_path);
-    recorded_to_ = options_.record_path;
-    if (recordings_++ > 0)
-        recorded_to_ = path.parent_path() /
-                       (path.stem().string() + "-" + std::to_string(recordings_) + path.extension().string());
-    try {
-        recording_ = std::make_unique<io::RecordingWriter>(recorded_to_);
-    } catch (const io::RecordingError& error) {
-        tell(error.what());
-    }
-}
-
-// A recording holds one machine, so that it can be replayed: it ends with a change, and another goes on.
-void Dashboard::set_parameter(const std::string& name, double value) {
-    const io::ModelFile& present = rig_.setup().model;
-    try {
-        rig::YamlVariant variant(present.text, present.path);
-        variant.set(name, value, false);
-        rig_.change_machine(io::parse_model(variant.text(), present.path));
-    } catch (const std::exception& error) {
-        return tell(error.what());
-    }
-    char number[32];
-    std::snprintf(number, sizeof number, "%.6g", value);
-    std::string text = "t=" + std::to_string(rig_.sim_time()) + " " + name + " is set to " + number;
-    if (recording_) {
-        recording_->end();
-        recording_.reset();
-        begin_recording();
-        text += "; recording goes on in " + recorded_to_;
-    }
-    tell(text);
-}
-
-void Dashboard::tell(const std::string& text) {
-    feed_.change("change", json{{"text", text}}.dump());
 }
 
 std::unique_ptr<std::istream> Dashboard::recording() const {

@@ -3,7 +3,8 @@
 //
 // What a viewer asks for takes one of two ways: values of inputs go to the rig at its next tick, and whatever
 // needs more than a tick's time (recording on or off, a parameter of the machine) is done between two
-// stretches of the loop, in the main thread: run() is that main thread.
+// stretches of the loop, in the main thread: run() is that main thread. Each stretch that is recorded has a
+// recording of its own: a recording holds one machine and one loop, so that it can be replayed.
 #pragma once
 
 #include <array>
@@ -35,13 +36,16 @@ struct DashboardOptions {
 
 class Dashboard {
   public:
+    // Throws RecordingError if it is to record at once and the file cannot be created.
     Dashboard(rig::Rig& rig, DashboardOptions options);
     ~Dashboard();
 
     std::string url() const { return http_->url(); }
-    // Runs the loop until stop() is called or its slots are over; returns the last stretch's report.
+    // Runs the loop until stop() is called, its slots are over or it gives up; returns the last stretch's report.
     rt::LoopReport run();
-    void stop() noexcept;  // from a signal handler or any thread
+    void stop();  // from any thread, not from a signal handler
+    // When run() has returned: everything that was to be recorded was, and the plant's state was always finite.
+    bool sound() const noexcept { return sound_; }
 
   private:
     static constexpr std::size_t most_signals = 1024, most_judged = 160;
@@ -74,12 +78,19 @@ class Dashboard {
 
     // In HTTP threads.
     std::string command(std::string_view verb, const std::string& body);
+    std::string refusal(const std::string& parameter, double value) const;
     std::string model_json() const;
     std::unique_ptr<std::istream> recording() const;
     void between_stretches(std::function<void()> what);
-    void begin_recording();
-    void set_parameter(const std::string& name, double value);
     void tell(const std::string& text);
+
+    // In the main thread.
+    rt::LoopReport run_stretch(std::int64_t slots);
+    const std::string& next_recording();
+    void begin_recording();
+    void end_recording();
+    void set_parameter(const std::string& name, double value);
+    void tell_trouble(const std::string& text);
 
     rig::Rig& rig_;
     DashboardOptions options_;
@@ -100,12 +111,14 @@ class Dashboard {
 
     mutable std::mutex mutex_;  // of what follows: HTTP threads and the main thread
     std::vector<std::function<void()>> waiting_;
-    std::atomic<rt::LoopControl*> control_{nullptr};
+    rt::LoopControl* control_ = nullptr;  // of the stretch that is running
     bool paused_ = false;
     double factor_ = 1;
+    bool to_record_ = false;  // the next stretch
     std::unique_ptr<io::RecordingWriter> recording_;
     std::string recorded_to_;
     int recordings_ = 0;
+    bool sound_ = true;
 };
 
 }  // namespace shiftrig::serve

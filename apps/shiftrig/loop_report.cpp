@@ -78,4 +78,9 @@ std::string describe(const rt::LoopReport& report) {
     return text;
 }
 
+std::string gave_up(const rt::LoopReport& report) {
+    if (report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped) return "";
+    return "the loop gave up after " + std::to_string(report.executed) + " ticks: " + name(report.outcome);
+}
+
 }  // namespace shiftrig::cli

@@ -18,4 +18,7 @@ nlohmann::json to_json(const rt::Refusals& refusals);
 // Some lines: counts, then percentiles of wake-up, lateness, step and response as far as recorded.
 std::string describe(const rt::LoopReport& report);
 
+// Why the loop gave up; empty if it came to its end, or to where somebody stopped it.
+std::string gave_up(const rt::LoopReport& report);
+
 }  // namespace shiftrig::cli

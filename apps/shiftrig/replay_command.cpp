@@ -117,7 +117,7 @@ int run_on(io::RecordingReader& reader, const Options& options) {
         std::cerr << reader.complaint() << '\n';
         return bad_input;
     }
-    return good;
+    return result.agrees() || other_model ? good : failed;
 }
 
 // Data of a real machine: a table, or the log of its bus as the model's stanza `can:` understands it.

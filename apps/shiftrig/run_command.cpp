@@ -2,9 +2,12 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -19,11 +22,11 @@
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/live_line.h"
 #include "apps/shiftrig/loop_report.h"
+#include "apps/shiftrig/resumed_rig.h"
 #include "apps/shiftrig/rig_options.h"
 #include "io/recording/csv.h"
 #include "io/recording/event_json.h"
 #include "io/recording/reader.h"
-#include "io/recording/snapshot.h"
 #include "plant/warnings.h"
 #include "rt/machine.h"
 
@@ -41,17 +44,10 @@ struct RunOptions : RigOptions {
 
 // A new rig, or one that goes on from a snapshot.
 std::unique_ptr<rig::Rig> make_rig(const RunOptions& options) {
-    if (options.from.empty()) {
-        rig::Choices choices = options.choices;
-        choices.lockstep = options.pacing() == rt::Pace::lockstep;
-        return std::make_unique<rig::Rig>(rig::make_setup(choices));
-    }
-    if (!options.choices.model.empty() || !options.choices.scenario.empty())
-        throw std::invalid_argument("--from brings its own model and scenario");
-    const io::Manifest snapshot = io::read_snapshot(options.from);
-    auto rig = std::make_unique<rig::Rig>(rig::setup_of(snapshot));
-    rig::resume(*rig, snapshot);
-    return rig;
+    if (!options.from.empty()) return resumed_rig(options.from, options);
+    rig::Choices choices = options.choices;
+    choices.lockstep = options.pacing() == rt::Pace::lockstep;
+    return std::make_unique<rig::Rig>(rig::make_setup(choices));
 }
 
 // What the model file says of its start, where that counts: a scenario and a snapshot may have brought their own.
@@ -92,10 +88,28 @@ void get_ready(const RunOptions& options, const rt::LoopControl& control) {
             std::min<std::chrono::duration<double>>(begin - Clock::now(), std::chrono::milliseconds(20)));
 }
 
+// A recording for the CSV alone: beside it, under a name that nobody has, gone with the run however that ends.
+class PassingRecording {
+  public:
+    explicit PassingRecording(const std::string& csv) : path_(csv + ".XXXXXX.lcmlog") {
+        const int file = mkstemps(path_.data(), std::strlen(".lcmlog"));
+        if (file < 0) throw io::RecordingError(csv + ": cannot be written: " + std::strerror(errno));
+        close(file);
+    }
+    PassingRecording(const PassingRecording&) = delete;
+    PassingRecording& operator=(const PassingRecording&) = delete;
+    ~PassingRecording() { unlink(path_.c_str()); }
+    const std::string& path() const noexcept { return path_; }
+
+  private:
+    std::string path_;
+};
+
 // What the session needs beside the rig, and what is left of it afterwards.
 struct Beside {
+    std::unique_ptr<PassingRecording> passing;  // where only CSV was asked for
     std::unique_ptr<io::RecordingWriter> recording;
-    std::string recording_path;  // "" if nothing is recorded; a temporary file where only CSV was asked for
+    std::string recording_path;  // "" if nothing is recorded
     std::unique_ptr<rig::Collector> collector;
     std::unique_ptr<rt::Trace> trace;
     io::RecordingSummary recorded;
@@ -103,9 +117,11 @@ struct Beside {
 
 Beside prepare(const RunOptions& options, const rig::Rig& rig, const rt::LoopSettings& loop) {
     Beside beside;
-    beside.recording_path = !options.record.empty() ? options.record
-                            : options.csv.empty()   ? ""
-                                                    : options.csv + ".lcmlog";
+    beside.recording_path = options.record;
+    if (options.record.empty() && !options.csv.empty()) {
+        beside.passing = std::make_unique<PassingRecording>(options.csv);
+        beside.recording_path = beside.passing->path();
+    }
     if (!beside.recording_path.empty())
         beside.recording = std::make_unique<io::RecordingWriter>(beside.recording_path);
     constexpr std::int64_t an_hour_of_ticks = 3'600'000;  // the collector takes what fits its memory of it
@@ -176,22 +192,30 @@ void run_loop(rig::Session& session, const RunOptions& options, LiveLine& live, 
     live.end();
 }
 
+// False, and told, if it did not work out: what else there is of the run is still wanted.
+bool export_csv(const std::string& recording, const std::string& csv) {
+    try {
+        io::RecordingReader reader(recording);
+        io::export_csv(reader, csv);
+        return true;
+    } catch (const io::RecordingError& error) {
+        std::cerr << error.what() << '\n';
+        return false;
+    }
+}
+
 // Closes what was recorded; false if something of it is lost.
 bool finish(const RunOptions& options, Beside& beside) {
     bool whole = true;
     if (beside.recording) {
         beside.recorded = beside.recording->end();
-        whole = beside.recorded.error.empty();
-        if (!whole) std::cerr << beside.recorded.error << '\n';
+        whole = beside.recorded.error.empty() && beside.recorded.lost == 0;
+        if (!beside.recorded.error.empty()) std::cerr << beside.recorded.error << '\n';
         if (beside.recorded.lost > 0)
             std::cerr << beside.recording_path << ": " << beside.recorded.lost
                       << " ticks were not kept: the disk did not keep up\n";
     }
-    if (!options.csv.empty()) {
-        io::RecordingReader reader(beside.recording_path);
-        io::export_csv(reader, options.csv);
-        if (options.record.empty()) unlink(beside.recording_path.c_str());
-    }
+    if (!options.csv.empty()) whole = export_csv(beside.recording_path, options.csv) && whole;
     if (beside.trace) {
         std::ofstream file(options.trace);
         beside.trace->write(file);
@@ -232,8 +256,7 @@ int run(const RunOptions& options) {
         for (auto& refusal : prepare_thread(options)) refusals.push_back(std::move(refusal));
     }).join();
     rt::LoopSettings loop = options.loop(rig.setup());
-    if (loop.slots > 0)
-        loop.slots = std::max<std::int64_t>(0, loop.slots - rig.ticks());  // a snapshot has done some
+    loop.slots -= rig.ticks();  // a snapshot has done some
     std::optional<rig::SnapshotTaker> taker;
     if (options.snapshot_at.first >= 0) taker.emplace(rig, options.snapshot_at.first);
     Beside beside = prepare(options, rig, loop);
@@ -273,6 +296,8 @@ int run(const RunOptions& options) {
     if (beside.collector->ticks_left_out() > 0)
         std::cerr << "shifts are judged without the last " << beside.collector->ticks_left_out()
                   << " ticks, which did not fit the memory\n";
+    if (beside.collector->events_left_out() > 0)
+        std::cerr << beside.collector->events_left_out() << " events are not told: they did not fit\n";
 
     const auto& report = session.report();
     const analysis::Run collected = beside.collector->finish(rig);
@@ -288,9 +313,7 @@ int run(const RunOptions& options) {
     } else {
         print_summary(rig, session, dissipated_before, scorecard);
     }
-    const bool ended_well =
-        report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped;
-    return whole && ended_well && session.certificate().is_finite() ? good : failed;
+    return whole && gave_up(report).empty() && session.certificate().is_finite() ? good : failed;
 }
 
 Command::Run declare(CLI::App& app) {
@@ -300,8 +323,10 @@ Command::Run declare(CLI::App& app) {
     app.add_option("--csv", options->csv, "every signal of every tick");
     app.add_option("--snapshot-at", options->snapshot_at, "copy the rig at this time [s] into this file")
         ->check(obeys({0, longest_s}, false).application_index(0));
-    app.add_option("--from", options->from,
-                   "go on from a snapshot; --duration counts from the start of its run");
+    app.add_option(
+        "--from", options->from,
+        "go on from a snapshot: its model, scenario, ticks, kernel, buses and controller; --duration "
+        "counts from the start of its run");
     app.add_option("--can-log", options->choices.can_log, "candump log of everything on the first CAN bus");
     app.add_option("--can-replay", options->choices.can_replay,
                    "candump log that takes the controller's place, at its own times");
@@ -310,7 +335,13 @@ Command::Run declare(CLI::App& app) {
                "seconds a command given as --controller has to get ready")
         ->capture_default_str();
     app.add_flag("--json", options->json, "end with one JSON object on standard output");
-    return [options] { return run(*options); };
+    return [options, &app] {
+        if (!options->from.empty()) refuse_what_a_snapshot_settles(app, options->choices);
+        // Its frames still to come are no part of the assembly.
+        if (options->snapshot_at.first >= 0 && !options->choices.can_replay.empty())
+            throw std::invalid_argument("--snapshot-at: a run on --can-replay cannot go on from a snapshot");
+        return run(*options);
+    };
 }
 
 const Command command("run", "run the machine, its buses and its controller", declare);

@@ -21,12 +21,36 @@ struct Options : RigOptions {
     std::string record;
 };
 
-int run(const Options& options) {
-    // SIGINT and SIGTERM are waited for by a thread of their own, so that ending needs nothing signal-safe.
+sigset_t ending_signals() {
     sigset_t ends;
     sigemptyset(&ends);
     sigaddset(&ends, SIGINT);
     sigaddset(&ends, SIGTERM);
+    return ends;
+}
+
+// SIGINT and SIGTERM, blocked everywhere else, are waited for by a thread of their own, so that ending needs nothing
+// signal-safe.
+class SignalsStop {
+  public:
+    explicit SignalsStop(serve::Dashboard& dashboard)
+        : thread_([&dashboard] {
+              const sigset_t ends = ending_signals();
+              int which = 0;
+              sigwait(&ends, &which);
+              dashboard.stop();
+          }) {}
+    ~SignalsStop() {  // the dashboard may go: nobody calls it any more
+        pthread_kill(thread_.native_handle(), SIGTERM);
+        thread_.join();
+    }
+
+  private:
+    std::thread thread_;
+};
+
+int run(const Options& options) {
+    const sigset_t ends = ending_signals();
     pthread_sigmask(SIG_BLOCK, &ends, nullptr);
 
     rig::Choices choices = options.choices;
@@ -49,26 +73,23 @@ int run(const Options& options) {
     if (const auto command = rig::controller_command(options.choices); !command.empty())
         controller.emplace(command);
 
-    std::thread([&dashboard, ends] {
-        int which = 0;
-        sigwait(&ends, &which);
-        dashboard.stop();
-    }).detach();
-
     rt::AwakeProcessors awake;
     rt::Refusals refusals = prepare_process(options, awake);
     rt::LoopReport report;
-    std::thread plant([&] {
-        for (auto& refusal : prepare_thread(options)) refusals.push_back(std::move(refusal));
-        report = dashboard.run();
-    });
-    plant.join();
+    {
+        const SignalsStop signals_stop(dashboard);
+        std::thread plant([&] {
+            for (auto& refusal : prepare_thread(options)) refusals.push_back(std::move(refusal));
+            report = dashboard.run();
+        });
+        plant.join();
+    }
     controller.reset();
     for (const auto& refusal : refusals)
         std::cerr << "this machine does not grant " << rt::to_string(refusal) << '\n';
     for (const auto& line : rig.buses().summary()) std::cerr << line << '\n';
     std::cout << describe(report);
-    return report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped ? good : failed;
+    return gave_up(report).empty() && dashboard.sound() ? good : failed;
 }
 
 Command::Run declare(CLI::App& app) {
@@ -78,8 +99,10 @@ Command::Run declare(CLI::App& app) {
         ->capture_default_str();
     add_number(app, "--port", options->http.port, {0, 65535}, "0: any free one")->capture_default_str();
     app.add_option("--token", options->http.token, "that every request must carry (?token=…)");
-    app.add_option("--record", options->record,
-                   "record from the start, to this file (recordings begun from the page go there too)");
+    app.add_option(
+        "--record", options->record,
+        "record from the start, to this file; after a change from the page the next ones go to FILE-2, "
+        "FILE-3, …");
     return [options] { return run(*options); };
 }
 

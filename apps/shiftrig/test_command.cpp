@@ -21,6 +21,7 @@
 #include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/child.h"
 #include "apps/shiftrig/command.h"
+#include "apps/shiftrig/loop_report.h"
 #include "apps/shiftrig/rig_options.h"
 
 namespace shiftrig::cli {
@@ -61,6 +62,26 @@ Case read_case(const std::string& path) {
         each.error = error.what();
     }
     return each;
+}
+
+// Why the run, as far as it came, is none to be judged: a failure, whatever was expected.
+std::vector<std::string> broken_run(const std::string& path, const rig::Session& session) {
+    std::vector<std::string> why;
+    if (auto reason = gave_up(session.report()); !reason.empty()) why.push_back(path + ": " + reason);
+    const auto& certificate = session.certificate();
+    if (!certificate.is_finite())
+        why.push_back(path + ": in " + std::to_string(certificate.flagged[2]) + " of " +
+                      std::to_string(certificate.ticks) + " ticks the state is not finite");
+    return why;
+}
+
+// What the judgement would have to do without; empty if nothing.
+std::string left_out(const rig::Collector& collector) {
+    if (const auto ticks = collector.ticks_left_out(); ticks > 0)
+        return "the run does not fit the memory: " + std::to_string(ticks) + " ticks too many";
+    if (const auto events = collector.events_left_out(); events > 0)
+        return "the run's events do not fit the memory: " + std::to_string(events) + " too many";
+    return "";
 }
 
 // Longest first: the last to end should be a short one.
@@ -107,18 +128,22 @@ analysis::TestResult run_one(const Options& options, const analysis::Limits& lim
         if (const auto command = rig::controller_command(options.choices); !command.empty())
             controller.emplace(command);
         session.run();
-        if (recording) recording->end();
-
         result.sim_time_s = rig.sim_time();
-        if (collector.ticks_left_out() > 0) {
-            result.error =
-                path + ": the run does not fit the memory: " + std::to_string(collector.ticks_left_out()) +
-                " ticks too many";
-        } else {
+        result.failures = broken_run(path, session);
+        if (const auto missing = left_out(collector); !missing.empty()) {
+            result.error = path + ": " + missing;
+        } else if (result.failures.empty()) {
             const analysis::Run run = collector.finish(rig);
             result.failures = analysis::broken_expectations(scenario, run, analysis::score(run, limits));
             if (result.expectations == 0)
                 result.failures.push_back(path + ": expects nothing, so it tests nothing");
+        }
+        if (recording) {
+            const io::RecordingSummary recorded = recording->end();
+            if (!recorded.error.empty()) result.failures.push_back(recorded.error);
+            if (recorded.lost > 0)
+                result.failures.push_back(path + ": " + std::to_string(recorded.lost) +
+                                          " ticks were not recorded: the disk did not keep up");
         }
     } catch (const std::exception& error) {
         result.error = error.what();

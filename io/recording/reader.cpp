@@ -67,6 +67,8 @@ struct RecordingReader::Implementation {
     LogEvent event;
     std::int64_t number = 0;  // of the next event
     std::int64_t previous_tick = -1;
+    std::int64_t ticks = 0, lost = 0;  // so far
+    std::int64_t lost_at_end = 0;
     std::vector<double> known[3];  // the tables as of the tick being read, in whole blocks
     Ending ending = Ending::cut_short;
     std::string complaint;
@@ -116,6 +118,10 @@ const std::string& RecordingReader::complaint() const noexcept {
 }
 bool RecordingReader::next(RecordedTick& tick) {
     return !implementation_->ended && implementation_->next(tick);
+}
+
+std::int64_t RecordingReader::lost_at_end() const noexcept {
+    return implementation_->lost_at_end;
 }
 
 const plant::Signal& RecordingReader::signal(Table table, std::size_t index) const {
@@ -310,6 +316,10 @@ bool RecordingReader::Implementation::next(RecordedTick& tick) {
             record_end_t end;
             if (!decode_record("record_end_t", end)) return false;
             if (!first || blocks > 0) return damaged("a tick without its closing record");
+            if (end.ticks != ticks || end.lost < lost)
+                return damaged("its closing record counts " + std::to_string(end.ticks) + " ticks and " +
+                               std::to_string(end.lost) + " lost");
+            lost_at_end = end.lost - lost;
             return stop(Ending::complete, "");
         } else {
             return damaged("unknown channel " + printable(event.channel));
@@ -331,6 +341,8 @@ bool RecordingReader::Implementation::take_closing(RecordedTick& tick, std::int3
                         known[1].begin() + static_cast<std::ptrdiff_t>(manifest.outputs.size()));
     tick.rig.assign(known[2].begin(), known[2].begin() + static_cast<std::ptrdiff_t>(manifest.rig.size()));
     previous_tick = closing.seq;
+    ++ticks;
+    lost += tick.lost_before;
     return true;
 }
 

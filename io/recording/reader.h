@@ -59,6 +59,9 @@ class RecordingReader {
     // One line naming the file for any ending but complete, otherwise empty.
     const std::string& complaint() const noexcept;
 
+    // At the end of a complete recording: ticks lost behind the last one that was kept.
+    std::int64_t lost_at_end() const noexcept;
+
     const plant::Signal& signal(Table table, std::size_t index) const;
 
   private:

@@ -119,7 +119,7 @@ ReplayResult replay(RecordingReader& reader, const plant::Model& model, const Re
                 tick.tick, 1e-9 * static_cast<double>(tick.sim_time_ns), signal, recorded, replayed, damaged};
     };
     bool known = true;  // the plant is where the recorded run was
-    while ((!options.stop_at_first || result.agrees()) && reader.next(tick)) {
+    while ((!options.stop_at_first || !result.first) && reader.next(tick)) {
         ++result.ticks;
         result.lost += tick.lost_before;
         for (const auto& damage : tick.damages)
@@ -170,6 +170,7 @@ ReplayResult replay(RecordingReader& reader, const plant::Model& model, const Re
             differ("state[" + std::to_string(at) + "]", digits(recorded), digits(replayed), false);
         }
     }
+    result.lost += reader.lost_at_end();
     return result;
 }
 

@@ -35,7 +35,9 @@ struct ReplayResult {
     std::int64_t lost = 0;      // missing in the recording
     std::optional<Difference> first;
     std::vector<Deviation> deviations;  // outputs that both sides have, in recorded order
-    bool agrees() const { return !first; }
+    // Every tick of the run was kept and compared, and none differs. What was lost proves nothing; a run that was stopped
+    // before its first tick has nothing to prove.
+    bool agrees() const { return !first && lost == 0 && compared == ticks; }
 };
 
 struct ReplayOptions {

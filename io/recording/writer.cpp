@@ -7,6 +7,7 @@
 #include <cstring>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -73,6 +74,7 @@ RecordingWriter::~RecordingWriter() {
 
 void RecordingWriter::begin(const Manifest& original) {
     auto& self = *implementation_;
+    if (self.queue) throw std::logic_error("a recording is begun once");
     Manifest manifest = original;
     if (manifest.start_utime == 0) manifest.start_utime = now_utime();
     self.wall_clock = manifest.wall_clock;

@@ -65,7 +65,7 @@ class RecordingWriter {
     RecordingWriter(const RecordingWriter&) = delete;
     RecordingWriter& operator=(const RecordingWriter&) = delete;
 
-    // Throws RecordingError if the manifest cannot be written.
+    // Once: a log holds one run. Throws RecordingError if the manifest cannot be written, std::logic_error the second time.
     void begin(const Manifest& manifest);
     // False: the tick was lost (counted and marked in the log), or the disk has failed.
     bool tick(const TickRecord& record) SHIFTRIG_REALTIME;

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "apps/rig/choices.h"
+#include "apps/rig/collector.h"
 #include "apps/rig/rehearsal.h"
 #include "apps/rig/scenario_run.h"
 
@@ -204,6 +205,36 @@ TEST(Rig, CommandThatIsNoNumberOrOutOfRangeIsLimitedAndNoted) {
     EXPECT_FALSE(rig.request(rig.signals().find("mass.vehicle.speed"), 1)) << "an output was set";
 }
 
+// The driver's signals act within their ranges as well: the plant limits what it is given, and the recording would tell
+// another story.
+TEST(Rig, DriverOutOfHisRangeIsLimitedAndNoted) {
+    Choices choices;
+    choices.controller = "none";
+    Rig rig(make_setup(choices, inline_scenario(std::string(ploughing_in_f2) + "duration_s: 1\n")));
+    const auto index = [&](const char* name) { return rig.signals().find(name); };
+    const auto expect_limited = [&](const char* name, double wanted, double acts) {
+        const double before = rig.value(index("rig.limited_inputs"));
+        ASSERT_TRUE(rig.request(index(name), wanted)) << name;
+        rig.tick();
+        EXPECT_EQ(rig.value(index(name)), acts) << name;
+        EXPECT_EQ(rig.value(index("rig.limited_inputs")), before + 1) << name;
+        ASSERT_EQ(rig.rig_events().size(), 2U) << name;
+        EXPECT_EQ(rig.rig_events()[1].kind, RigEventKind::input_limited) << name;
+        EXPECT_EQ(rig.rig_events()[1].signal, index(name));
+        rig.tick();
+        EXPECT_EQ(rig.value(index(name)), acts) << name;
+        EXPECT_EQ(rig.value(index("rig.limited_inputs")), before + 1) << name << " is noted once";
+    };
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    expect_limited("driver.lever", 500, 99);
+    expect_limited("driver.lever", nan, 99);
+    expect_limited("driver.auto", -1, 0);
+    expect_limited("driver.parking_brake", 2, 1);
+    expect_limited("driver.clutch_pedal", 5, 1);
+    EXPECT_EQ(rig.value(index("clutch.Fc.release_command")), 1);
+    expect_limited("driver.clutch_pedal", -std::numeric_limits<double>::infinity(), 0);
+}
+
 TEST(Rig, PedalReleasesTheMainClutchWhateverTheControllerSays) {
     const auto result = run_scenario(
         inline_scenario(std::string(ploughing_in_f2) +
@@ -234,6 +265,28 @@ TEST(Rig, CertificateOfARunKeepsTheWorstAndCountsTheTicksOfEachFlag) {
     run.take(tick);
     EXPECT_FALSE(run.is_finite());
     EXPECT_EQ(run.ticks, 3);
+}
+
+// A `must_not` says nothing about events that were dropped, so every one is counted.
+TEST(Rig, EventsThatDoNotFitATickOrTheCollectorAreCounted) {
+    std::string text = std::string(ploughing_in_f2) + "duration_s: 1\ntimeline:\n";
+    for (int i = 0; i < 300; ++i) text += "  - {at_s: 0.005, driver.throttle: 0.7}\n";
+    Rig rig(make_setup({}, inline_scenario(text)));
+    CollectorOptions little;
+    little.most_events = 100;
+    Collector roomy(rig, 20), small(rig, 20, little);
+    std::int64_t told = 0, not_kept = 0;
+    for (int i = 0; i < 20; ++i) {
+        rig.tick();
+        roomy.take(rig);
+        small.take(rig);
+        told += static_cast<std::int64_t>(rig.rig_events().size());
+        not_kept += rig.rig_events_not_kept();
+    }
+    EXPECT_GE(told, 256);
+    EXPECT_EQ(not_kept, 300 - 256);
+    EXPECT_EQ(roomy.events_left_out(), not_kept);
+    EXPECT_EQ(small.events_left_out(), not_kept + told - 100);
 }
 
 TEST(Rig, ScenarioThatSetsAnOutputIsRefusedWithItsPlace) {

@@ -6,10 +6,12 @@ import csv
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -96,6 +98,33 @@ class BadInput(InAFolder):
         self.assert_one_line(run("nosuch.yaml"), "nosuch.yaml")
         self.assert_one_line(run(), "a model or a scenario is needed")
 
+    def test_what_a_snapshot_has_settled_is_not_asked_again(self):
+        snapshot, log = self.path("s.snap"), self.path("from.log")
+        free("--snapshot-at", "1", snapshot)
+        settled = ": --from brings its own model, scenario, ticks, kernel, buses and controller$"
+        for arguments, pattern in [
+            (("tractor.yaml",), "MODEL" + settled),
+            (("--scenario", SHIFT), "--scenario" + settled),
+            (("--rate-hz", "500"), "--rate-hz" + settled),
+            (("--substeps", "3"), "--substeps" + settled),
+            (("--kernel", "portable"), "--kernel" + settled),
+            (("--bus", "udpcan:nonsense", "--can-log", log), "--bus" + settled),
+            (("--can-replay", "nosuch.log"), "--can-replay" + settled),
+            (("--controller", "none"), "--controller none" + settled),
+            (("--controller", "builtin:nosuch.yaml"), "--controller builtin:nosuch.yaml" + settled),
+            (("--controller", "true"), "--controller: the controller of .*s.snap is the built-in one$"),
+            (("--duration", "0.5"), r"--from .*s.snap: the snapshot is of 1 s, and the run ends at 0\.5 s \(--duration\)$"),
+            (("--duration", "1"), r"--from .*s.snap: the snapshot is of 1 s, and the run ends at 1 s \(--duration\)$"),
+        ]:
+            self.assert_one_line(run("--from", snapshot, *arguments), pattern)
+        self.assertFalse(os.path.exists(log))
+
+    def test_a_snapshot_does_not_know_how_far_a_candump_log_was_played(self):
+        log = self.path("shift.log")
+        free("--can-log", log)
+        self.assert_one_line(run("--scenario", SHIFT, "--can-replay", log, "--snapshot-at", "1", self.path("s.snap")),
+                             "--snapshot-at: a run on --can-replay cannot go on from a snapshot$")
+
     def test_recording_that_cannot_be_written(self):
         self.assert_one_line(run("--scenario", SHIFT, "--record", "/nosuch/dir/x.lcmlog"), "/nosuch/dir/x.lcmlog")
 
@@ -154,6 +183,20 @@ class Results(InAFolder):
         self.assertGreater(rest, 0.1 * whole)  # a sixth of the time
         self.assertLess(rest, 0.25 * whole)
 
+    def test_a_snapshot_goes_on_at_any_pace_and_its_can_log_is_the_end_of_the_whole_ones(self):
+        snapshot, whole, rest = self.path("s.snap"), self.path("whole.log"), self.path("rest.log")
+        final = free("--snapshot-at", "2.2", snapshot, "--can-log", whole)["final"]
+        for pace in ("free", "lockstep"):
+            done = run("--from", snapshot, "--pace", pace, "--json", "--can-log", rest)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            again = json.loads(done.stdout.splitlines()[-1])["final"]
+            self.assertEqual({k for k in final if final[k] != again[k] and not k.startswith("certificate.mode_")}, set())
+            with open(whole) as file:  # what was said at the end of the tick before is not said again
+                expected = [line for line in file if float(line[1:18]) > 2.2]
+            with open(rest) as file:
+                found = [line for line in file if float(line[1:18]) > 2.2]
+            self.assertEqual(found, expected)
+
     def test_ticks_whose_parts_stay_coarse_are_told(self):
         # A shaft that swings 16 rad a millisecond, in parts of 8.
         def machine_with(method):
@@ -179,6 +222,30 @@ class Results(InAFolder):
                                       '"b" at 4 rad/s instead of 0\n')
         self.assertAlmostEqual(json.loads(done.stdout)["final"]["mass.a.speed_rad_s"], 8, 12)
 
+    def test_ticks_that_the_disk_did_not_take_are_not_proven(self):
+        """A minute at fifty times real time, into a pipe that nobody reads for a while."""
+        pipe, recording = self.path("pipe"), self.path("shift.lcmlog")
+        os.mkfifo(pipe)
+
+        def read_late():
+            with open(pipe, "rb") as source, open(recording, "wb") as file:
+                file.write(source.read(1 << 20))
+                time.sleep(3)
+                shutil.copyfileobj(source, file)
+
+        reader = threading.Thread(target=read_late)
+        reader.start()
+        done = run("--scenario", SHIFT, "--duration", "60", "--factor", "50", "--catch-up", "100000", "--record", pipe)
+        reader.join()
+        self.assertRegex(done.stderr, r"pipe: \d+ ticks were not kept: the disk did not keep up\n")
+        self.assertEqual(done.returncode, 1)
+        lost = int(re.search(r"pipe: (\d+) ticks", done.stderr).group(1))
+        replayed = subprocess.run([SHIFTRIG, "replay", recording], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(replayed.returncode, 1, replayed.stderr + replayed.stdout)
+        self.assertRegex(replayed.stdout, r"ticks agree bit for bit \(kernel \w+\)\n%d ticks are missing in the recording; " % lost)
+        found = subprocess.run([SHIFTRIG, "replay", recording, "--json"], stdout=subprocess.PIPE, text=True)
+        self.assertEqual((found.returncode, json.loads(found.stdout)["agrees"], json.loads(found.stdout)["lost"]), (1, False, lost))
+
     def test_csv_has_every_tick_and_names_with_units(self):
         path = self.path("shift.csv")
         result = free("--csv", path)
@@ -187,6 +254,28 @@ class Results(InAFolder):
         self.assertEqual(len(rows), result["ticks"])
         self.assertEqual(float(rows[-1]["mass.vehicle.speed_m_s"]), result["final"]["mass.vehicle.speed_m_s"])
         self.assertEqual(os.listdir(self.folder), ["shift.csv"])
+
+    def test_csv_leaves_files_of_similar_names_alone(self):
+        path, others = self.path("shift.csv"), ["shift.csv.lcmlog", "shift.lcmlog"]
+        for name in others:
+            with open(self.path(name), "w") as file:
+                file.write("mine")
+        free("--csv", path)
+        for name in others:
+            with open(self.path(name)) as file:
+                self.assertEqual(file.read(), "mine")
+        self.assertEqual(sorted(os.listdir(self.folder)), ["shift.csv", *others])
+
+    def test_csv_that_cannot_be_written_leaves_nothing_behind(self):
+        path = self.path("shift.csv")
+        os.symlink("/dev/full", path)
+        done = run("--scenario", SHIFT, "--pace", "free", "--csv", path, "--snapshot-at", "2", self.path("s.snap"))
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(path + ": cannot be written: No space left on device\n", done.stderr)
+        self.assertEqual(sorted(os.listdir(self.folder)), ["s.snap", "shift.csv"])
+        done = run("--scenario", SHIFT, "--pace", "free", "--csv", "/nosuch/dir/shift.csv")
+        self.assertEqual((done.returncode, done.stderr),
+                         (2, "/nosuch/dir/shift.csv: cannot be written: No such file or directory\n"))
 
     def test_recording_replays_bit_for_bit_and_the_trace_is_json(self):
         recording, trace = self.path("shift.lcmlog"), self.path("trace.json")

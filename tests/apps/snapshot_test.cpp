@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <filesystem>
+#include <memory>
 
 #include "apps/rig/fork.h"
 #include "io/recording/snapshot.h"
@@ -34,6 +37,21 @@ void write_snapshot_at(const std::string& path, double at) {
     taker.write(path, rig, loop, collector.finish(rig));
 }
 
+void expect_same_tick(const Rig& whole, const Rig& continued) {
+    const auto a = values_of(whole), b = values_of(continued);
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        const auto& name = whole.signals().signal(static_cast<int>(i)).name;
+        ASSERT_TRUE(std::memcmp(&a[i], &b[i], sizeof(double)) == 0 || is_bookkeeping(name))
+            << name << " at " << whole.sim_time() << " s";
+    }
+    ASSERT_EQ(whole.plant_events().size(), continued.plant_events().size());
+    ASSERT_EQ(whole.rig_events().size(), continued.rig_events().size());
+    for (std::size_t i = 0; i < whole.rig_events().size(); ++i)
+        ASSERT_EQ(explain(whole.signals(), whole.rig_events()[i]),
+                  explain(continued.signals(), continued.rig_events()[i]));
+}
+
 class Continued : public testing::TestWithParam<double> {};
 
 TEST_P(Continued, RunEqualsTheUninterruptedOneBitForBit) {
@@ -46,19 +64,62 @@ TEST_P(Continued, RunEqualsTheUninterruptedOneBitForBit) {
     for (int tick = 0; tick < 2000; ++tick) {
         whole.tick();
         continued.tick();
-        const auto a = values_of(whole), b = values_of(continued);
-        ASSERT_EQ(a.size(), b.size());
-        for (std::size_t i = 0; i < a.size(); ++i) {
-            const auto& name = whole.signals().signal(static_cast<int>(i)).name;
-            ASSERT_TRUE(std::memcmp(&a[i], &b[i], sizeof(double)) == 0 || is_bookkeeping(name))
-                << name << " " << tick << " ticks after the snapshot";
-        }
-        ASSERT_EQ(whole.plant_events().size(), continued.plant_events().size());
+        ASSERT_NO_FATAL_FAILURE(expect_same_tick(whole, continued));
     }
 }
 
 // Before, in the fill, in the torque phase and in the inertia phase of the shift.
 INSTANTIATE_TEST_SUITE_P(Times, Continued, testing::Values(1.0, 2.1, 2.2, 2.32));
+
+std::vector<std::string> scenarios() {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(SHIFTRIG_SOURCE_DIR "/config/scenarios"))
+        if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem());
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+// A scenario goes on from snapshots at these times [s], in rising order, as it does on its own.
+void expect_same_from(const std::string& scenario, const std::vector<double>& times, double end) {
+    Rig whole(setup_for(scenario));
+    rt::LoopSettings loop;
+    loop.pace = rt::Pace::free;
+    std::vector<std::unique_ptr<Rig>> continued;
+    while (whole.sim_time() < end) {
+        if (continued.size() < times.size() && whole.sim_time() >= times[continued.size()]) {
+            TemporaryFile file(".lcmlog");
+            SnapshotTaker taker(whole, 0);
+            taker.offer(whole);
+            taker.write(file.path, whole, loop, {});
+            const io::Manifest snapshot = io::read_snapshot(file.path);
+            continued.push_back(std::make_unique<Rig>(setup_of(snapshot)));
+            resume(*continued.back(), snapshot);
+        }
+        whole.tick();
+        for (auto& each : continued) {
+            each->tick();
+            ASSERT_NO_FATAL_FAILURE(expect_same_tick(whole, *each));
+        }
+    }
+    EXPECT_EQ(continued.size(), times.size());
+}
+
+class EveryScenario : public testing::TestWithParam<std::string> {};
+
+// From its first, second and third quarter to the end, of long ones the first half minute: whatever a scenario does to
+// machine, buses and controller has begun, is going on or is over in one of them.
+TEST_P(EveryScenario, GoesOnFromItsSnapshotsAsIfNothingHadHappened) {
+    const double end = std::min(30.0, setup_for(GetParam()).scenario->duration);
+    expect_same_from(GetParam(), {0.25 * end, 0.5 * end, 0.75 * end}, end);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenarios, EveryScenario, testing::ValuesIn(scenarios()),
+                         [](const auto& each) { return each.param; });
+
+// The controller begins anew in the very tick after its silence, and must do so after a snapshot in between as well.
+TEST(Snapshot, OfTheLastTicksOfASilenceKnowsOfIt) {
+    expect_same_from("silent_controller", {3.998, 3.999, 4, 4.001}, 6);
+}
 
 TEST(Snapshot, OfAnotherMachineIsRefused) {
     TemporaryFile file(".lcmlog");

@@ -2,10 +2,12 @@
 """shiftrig test on every shipped scenario: usage test_command_test.py SHIFTRIG SOURCE_FOLDER.
 
 All pass with the reference controller; with the bad calibration shipped beside it exactly those fail that should;
-the JUnit file parses and agrees; a broken expectation is one line with scenario, time, signal, expected, found."""
+runs that gave up, are not finite or could not be kept whole fail whatever was expected of them; the JUnit file
+parses and agrees; a broken expectation is one line with scenario, time, signal, expected, found."""
 import glob
 import os
 import re
+import resource
 import subprocess
 import sys
 import tempfile
@@ -25,8 +27,8 @@ def check(claim, holds, shown=""):
         print(shown)
 
 
-def run(*words):
-    return subprocess.run([shiftrig, "test", *words], capture_output=True, text=True)
+def run(*words, **options):
+    return subprocess.run([shiftrig, "test", *words], capture_output=True, text=True, **options)
 
 
 scenarios = sorted(glob.glob("config/scenarios/*.yaml"))
@@ -48,6 +50,48 @@ check("and says where, what, found and expected",
       bad.stdout)
 creep = run("config/scenarios/creep.yaml", "--controller", "builtin:config/calibration/bad.yaml")
 check("but not creeping along, which needs no shift", creep.returncode == 0, creep.stdout + creep.stderr)
+
+
+
+def scenario(name, text):
+    path = os.path.join(folder, name + ".yaml")
+    with open(path, "w") as file:
+        file.write(text)
+    return path
+
+
+# A `must_not` alone is kept by every run that does nothing: by one that gave up and by one that is not finite.
+shift = open("config/scenarios/plough_upshift.yaml").read().replace("../tractor.yaml", os.path.abspath("config/tractor.yaml"))
+only_must_not = re.sub(r"(?s)^expect:.*", "expect:\n  must_not:\n    - {kind: engine_stalls}\n", shift, flags=re.M)
+shift = scenario("shift", only_must_not)
+check("a run that holds passes", run(shift).returncode == 0)
+junit = os.path.join(folder, "gave_up.xml")
+gave_up = run(shift, "--pace", "wall", "--overrun", "abort", "--catch-up", "0", "--factor", "10000", "--junit", junit)
+check("a run that gave up fails, whatever was expected",
+      gave_up.returncode == 1 and re.search(r"shift\.yaml: the loop gave up after \d+ ticks: too_far_behind\n", gave_up.stdout),
+      gave_up.stdout + gave_up.stderr)
+check("in JUnit, too", ElementTree.parse(junit).getroot().get("failures") == "1")
+
+scenario("fast", "name: fast\nmasses:\n  a: {inertia_kg_m2: 1, initial_speed_rad_s: 1e200}\n  b: {inertia_kg_m2: 1}\n"
+         "shafts:\n  s: {a: a, b: b, stiffness_nm_per_rad: 1000, damping_nm_s_per_rad: 1}\n")
+no_number = run(scenario("no_number", "model: fast.yaml\nabout: a speed whose square is none\nduration_s: 0.01\n"
+                         "expect:\n  must_not:\n    - {kind: engine_stalls}\n"))
+check("a run whose state is not finite fails, whatever was expected",
+      no_number.returncode == 1 and "no_number.yaml: in 10 of 10 ticks the state is not finite\n" in no_number.stdout,
+      no_number.stdout + no_number.stderr)
+
+crowd = run(scenario("crowd", re.sub(r"(?ms)^timeline:.*?(?=^\w)", "", only_must_not) + "timeline:\n"
+                     + "  - {at_s: 0.5, driver.throttle: 0.7}\n" * 300))
+check("a run whose events did not all fit cannot be judged",
+      crowd.returncode == 2 and "crowd.yaml: the run's events do not fit the memory: 44 too many\n" in crowd.stdout,
+      crowd.stdout + crowd.stderr)
+
+recordings = os.path.join(folder, "recordings")
+os.mkdir(recordings)
+lost = run(shift, "--record", recordings, restore_signals=False,  # SIGXFSZ stays ignored: the write fails instead
+           preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, 1 << 20)))
+check("a recording that is cut short by its disk is told and fails",
+      lost.returncode == 1 and "shift.lcmlog: cannot be written: File too large\n" in lost.stdout, lost.stdout + lost.stderr)
 
 missing = run("config/scenarios/nowhere.yaml")
 check("a scenario that is not there is one line and exit code 2",

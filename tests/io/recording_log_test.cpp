@@ -174,6 +174,21 @@ TEST(Recording, LostTicksAreMarkedAndFollowedByAState) {
     EXPECT_TRUE(same_bits(ticks[4].outputs, t.outputs));
 }
 
+TEST(Recording, IsBegunOnce) {
+    TemporaryFile file(".lcmlog");
+    RecordingWriter writer(file.path);
+    writer.begin(manifest());
+    EXPECT_THROW(writer.begin(manifest()), std::logic_error);
+    Tick t;
+    fill(t, 0);
+    EXPECT_TRUE(writer.tick(t.record));
+    EXPECT_EQ(writer.end().ticks, 1);
+    EXPECT_THROW(writer.begin(manifest()), std::logic_error);
+    RecordingReader reader(file.path);
+    EXPECT_EQ(read_all(reader).size(), 1u);
+    EXPECT_EQ(reader.ending(), Ending::complete) << reader.complaint();
+}
+
 TEST(Recording, FullDiskEndsTheLogButNotTheRun) {
     RecordingWriter writer("/dev/full");
     EXPECT_THROW(

@@ -162,7 +162,8 @@ TEST(Replay, GoesOnBehindAGap) {
     const auto summary = record_shift(file.path, options);
     ASSERT_GT(summary.lost, 0);
     const auto result = replay_file(file.path);
-    EXPECT_TRUE(result.agrees()) << words(result);
+    EXPECT_FALSE(result.first) << words(result);
+    EXPECT_FALSE(result.agrees()) << "what was lost proves nothing";
     EXPECT_EQ(result.lost, summary.lost);
     EXPECT_EQ(result.ticks, 1500 - summary.lost);
     // The log thread may fall behind more than once; the first tick after each gap only gives its state.
@@ -171,6 +172,28 @@ TEST(Replay, GoesOnBehindAGap) {
     for (RecordedTick tick; reader.next(tick);) gaps += tick.lost_before > 0 ? 1 : 0;
     EXPECT_GE(gaps, 1);
     EXPECT_EQ(result.compared, result.ticks - gaps);
+}
+
+TEST(Replay, CountsTicksLostBehindTheLastOneKept) {
+    TemporaryFile file(".lcmlog");
+    ShiftOptions options;
+    options.starve_the_log = true;
+    options.ticks = 450;
+    const auto summary = record_shift(file.path, options);
+    const auto result = replay_file(file.path);
+    EXPECT_FALSE(result.first) << words(result);
+    EXPECT_EQ(result.compared, result.ticks) << "without a gap in between";
+    EXPECT_GT(result.lost, 0);
+    EXPECT_EQ(result.lost, summary.lost);
+    EXPECT_FALSE(result.agrees());
+}
+
+TEST(Replay, OfARunStoppedBeforeItsFirstTickAgrees) {
+    TemporaryFile file(".lcmlog");
+    ShiftOptions options;
+    options.ticks = 0;
+    record_shift(file.path, options);
+    EXPECT_TRUE(replay_file(file.path).agrees());
 }
 
 TEST(Replay, AnotherKernelAgreesWithinATolerance) {
