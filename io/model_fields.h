@@ -172,7 +172,8 @@ void fields(Fields& f, plant::ActuationHydraulic& h) {
     f.number("damping_ratio", h.damping_ratio, positive, "of the valve");
     f.number("slew_bar_per_s", h.slew, positive, "steepest change of pressure");
     f.number("maximum_pressure_bar", h.maximum_pressure, positive, "of the supply");
-    f.number("preload_pressure_bar", h.preload_pressure, not_negative, "return spring at zero stroke");
+    f.number("preload_pressure_bar", h.preload_pressure, not_negative,
+             "return spring at zero stroke; at most return_pressure_bar");
     f.number("stroke_mm", h.stroke, not_negative,
              "of the piston to the kiss point; 0 with fill_volume 0: no fill");
     f.number("fill_volume_cm3", h.fill_volume, not_negative, "oil that the stroke takes");

@@ -87,6 +87,11 @@ void check_parameters(const Check& check, const Clutch& c) {
         check.not_negative("stroke", h->stroke);
         check.not_negative("fill_volume", h->fill_volume);
         if (h->fill_volume > 0) check.positive("fill_flow", h->fill_flow);
+        // A spring that weakens along the stroke has no stroke that balances a pressure.
+        const auto* wet = std::get_if<WetPlates>(&c.friction);
+        if (wet && has_piston(*h) && !(h->preload_pressure <= wet->return_pressure))
+            check.fail("preload_pressure",
+                       "= " + number(h->preload_pressure) + "; must be <= return_pressure");
         if (h->solenoid) {
             check.rising("solenoid", h->solenoid->pressure_over_current);
             check.not_negative("hysteresis", h->solenoid->hysteresis);

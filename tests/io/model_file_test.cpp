@@ -260,6 +260,9 @@ TEST(ModelFile, AMisspeltMassIsNamedWithItsNeighbour) {
 TEST(ModelFile, WhatThePlantRefusesIsShownAsWritten) {
     EXPECT_EQ(refusal(two_masses + replaced(wet_clutch, "inner_radius_m: 0.085", "inner_radius_m: 0.2")),
               "m.yaml:12:7: clutch \"F2\": wet_plates.inner_radius_m = 0.2; must be < outer_radius");
+    EXPECT_EQ(
+        refusal(two_masses + replaced(wet_clutch, "preload_pressure_bar: 0.8", "preload_pressure_bar: 5")),
+        "m.yaml:26:7: clutch \"F2\": hydraulic.preload_pressure_bar = 5; must be <= return_pressure");
     const std::string engine =
         "engines:\n"
         "  e: {mass: left, full_load_rpm_nm: [[700, 550], [2154, 729]], governor_slope_nm_s_per_rad: 187,\n"
