@@ -310,9 +310,10 @@ void fields(Fields& f, plant::TorqueConverter& c) {
     f.link("pump", c.pump, "driving mass");
     f.link("turbine", c.turbine, "driven mass");
     f.table("k_over_speed_ratio_rad_s_per_sqrt_nm", c.k_over_speed_ratio, 1, 1,
-            "[[turbine/pump speed, K = ω/√T], …]");
+            "[[turbine/pump speed, K = ω/√T], …]", {fraction, positive});
     f.table("torque_ratio_over_speed_ratio", c.torque_ratio_over_speed_ratio, 1, 1,
-            "[[turbine/pump speed, turbine/pump torque], …]");
+            "[[turbine/pump speed, turbine/pump torque], …]; their product nowhere beyond 1",
+            {fraction, not_negative});
 }
 
 template <class Fields>

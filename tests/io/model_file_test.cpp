@@ -277,6 +277,26 @@ TEST(ModelFile, WhatThePlantRefusesIsShownAsWritten) {
               "m.yaml:6:50: engine \"e\": full_load_rpm_nm = [700, 729]; x must rise from pair to pair");
 }
 
+TEST(ModelFile, APointOfATableIsNamedWithItsOwnPlace) {
+    const std::string converter =
+        "converters:\n"
+        "  c:\n"
+        "    pump: left\n"
+        "    turbine: right\n"
+        "    k_over_speed_ratio_rad_s_per_sqrt_nm: [[0, 6.6], [1, 12.4]]\n"  // 9
+        "    torque_ratio_over_speed_ratio: [[0, 2], [1, 1]]\n";             // 10
+    EXPECT_EQ(refusal(two_masses + replaced(converter, "[1, 12.4]", "[1, 0]")),
+              "m.yaml:9:54: converter \"c\": k_over_speed_ratio_rad_s_per_sqrt_nm = [1, 0]; y must be > 0");
+    EXPECT_EQ(refusal(two_masses + replaced(converter, "[1, 12.4]", "[1.5, 12.4]")),
+              "m.yaml:9:54: converter \"c\": k_over_speed_ratio_rad_s_per_sqrt_nm = [1.5, 12.4]; x must be "
+              "within 0 and 1");
+    EXPECT_EQ(refusal(two_masses + replaced(converter, "[1, 1]", "[1, -1]")),
+              "m.yaml:10:45: converter \"c\": torque_ratio_over_speed_ratio = [1, -1]; y must be at least 0");
+    EXPECT_EQ(refusal(two_masses + replaced(converter, "[1, 1]", "[1, 1.1]")),
+              "m.yaml:10:5: converter \"c\": torque_ratio_over_speed_ratio is 1.1 at speed ratio 1, more "
+              "power than goes in; their product must be <= 1");
+}
+
 TEST(ModelFile, GearPathsAndSafeCommandsNameClutchesThereAre) {
     EXPECT_EQ(refusal(two_masses + wet_clutch + "gear_paths:\n  one: {closed: [F1]}\n"),
               "m.yaml:31:9: gear path \"one\": closed = F1; must name a clutch; nearest: F2");

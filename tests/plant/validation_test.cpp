@@ -45,5 +45,46 @@ TEST(Validation, TheReturnSpringOfAPistonDoesNotWeakenAlongItsStroke) {
     EXPECT_EQ(refusal(wet_clutch(5e5, 0)), "") << "without a piston nobody asks for it";
 }
 
+// ---- converters -------------------------------------------------------------------------------------
+
+using Points = std::vector<std::pair<double, double>>;
+
+std::string converter_refusal(const Points& k, const Points& torque_ratio) {
+    Description d;
+    d.masses = {mass("engine", 1), mass("turbine", 2)};
+    d.converters = {{"c", "engine", "turbine", k, torque_ratio}};
+    return refusal(d);
+}
+
+TEST(Validation, AConverterTakesTorqueAtEverySpeedRatio) {
+    const Points torque_ratio = {{0, 2.5}, {0.85, 1}, {1, 1}};
+    EXPECT_EQ(converter_refusal({{0, 6.6}, {1, 12.4}}, torque_ratio), "");
+    EXPECT_EQ(converter_refusal({{0, 6.6}, {1, 0}}, torque_ratio),
+              "converter \"c\": k_over_speed_ratio is 0 at speed ratio 1; must be > 0");
+    EXPECT_EQ(converter_refusal({{0, -6.6}, {1, 12.4}}, torque_ratio),
+              "converter \"c\": k_over_speed_ratio is -6.6 at speed ratio 0; must be > 0");
+    EXPECT_EQ(converter_refusal({{0, 6.6}, {1.2, 12.4}}, torque_ratio),
+              "converter \"c\": k_over_speed_ratio has the speed ratio 1.2; must be within 0 and 1");
+    EXPECT_EQ(converter_refusal({{-0.5, 6.6}, {1, 12.4}}, torque_ratio),
+              "converter \"c\": k_over_speed_ratio has the speed ratio -0.5; must be within 0 and 1");
+}
+
+TEST(Validation, AConverterPassesNoMorePowerThanItTakes) {
+    const Points k = {{0, 6.6}, {1, 12.4}};
+    EXPECT_EQ(converter_refusal(k, {{0, 2}, {1, 1}}), "") << "ν (2 − ν) is 1 at the end";
+    EXPECT_EQ(converter_refusal(k, {{0, 2}, {1, -0.1}}),
+              "converter \"c\": torque_ratio_over_speed_ratio is -0.1 at speed ratio 1; must be >= 0");
+    EXPECT_EQ(
+        converter_refusal(k, {{0, 2}, {0.9, 1.2}}),
+        "converter \"c\": torque_ratio_over_speed_ratio is 1.2 at speed ratio 1, more power than goes in; "
+        "their product must be <= 1");
+    // Both ends pass nothing; between them ν (4 − 4 ν) rises to 1, ν (5 − 5 ν) to 1.25.
+    EXPECT_EQ(converter_refusal(k, {{0, 4}, {1, 0}}), "");
+    EXPECT_EQ(
+        converter_refusal(k, {{0, 5}, {1, 0}}),
+        "converter \"c\": torque_ratio_over_speed_ratio is 2.5 at speed ratio 0.5, more power than goes in; "
+        "their product must be <= 1");
+}
+
 }  // namespace
 }  // namespace shiftrig::plant
