@@ -377,7 +377,7 @@ void fields(Fields& f, plant::Oil& o) {
              "drag is linear up to this slip, constant above");
     f.number("cold_temperature_degc", o.cold_temperature, any, "where the two factors below hold");
     f.number("warm_temperature_degc", o.warm_temperature, any,
-             "where they are 1; between, by ln of the viscosity");
+             "where they are 1, above cold_temperature_degc; between, by ln of the viscosity");
     f.number("cold_dead_time_factor", o.cold_dead_time_factor, positive, "on the valves' dead time");
     f.number("cold_valve_frequency_factor", o.cold_valve_frequency_factor, positive,
              "on the valves' frequency");

@@ -277,6 +277,17 @@ TEST(ModelFile, WhatThePlantRefusesIsShownAsWritten) {
               "m.yaml:6:50: engine \"e\": full_load_rpm_nm = [700, 729]; x must rise from pair to pair");
 }
 
+TEST(ModelFile, OilIsWarmAboveItsColdTemperature) {
+    const std::string oil =
+        "oil: {viscosity_at_zero_pa_s: 0.5, viscosity_decay_per_degc: 0.0414, initial_temperature_degc: 90,\n"
+        "      drag_speed_limit_rad_s: 60, cold_temperature_degc: -10, warm_temperature_degc: 90,\n"
+        "      cold_dead_time_factor: 4, cold_valve_frequency_factor: 0.4, fill_viscosity_pa_s: 0.1,\n"
+        "      pump_flow_l_per_min: 60}\n";
+    EXPECT_EQ(refusal(two_masses + oil), "");
+    EXPECT_EQ(refusal(two_masses + replaced(oil, "warm_temperature_degc: 90", "warm_temperature_degc: -10")),
+              "m.yaml:6:63: oil.warm_temperature_degc = -10; must be > cold_temperature");
+}
+
 TEST(ModelFile, APointOfATableIsNamedWithItsOwnPlace) {
     const std::string converter =
         "converters:\n"

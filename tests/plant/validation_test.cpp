@@ -1,6 +1,8 @@
 // What the plant refuses to build: each refusal word for word, and the neighbour that it accepts.
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "plant/plant.h"
 #include "tests/plant/machines.h"
 #include "tests/plant/parts.h"
@@ -43,6 +45,38 @@ TEST(Validation, TheReturnSpringOfAPistonDoesNotWeakenAlongItsStroke) {
     EXPECT_EQ(refusal(wet_clutch(5e5, 2e-3)),
               "clutch \"F2\": preload_pressure = 500000; must be <= return_pressure");
     EXPECT_EQ(refusal(wet_clutch(5e5, 0)), "") << "without a piston nobody asks for it";
+}
+
+// ---- oil --------------------------------------------------------------------------------------------
+
+std::string oil_refusal(double Oil::*field, double value) {
+    Description d;
+    d.masses = {mass("left", 1)};
+    d.oil = reference_oil();
+    (*d.oil).*field = value;
+    return refusal(d);
+}
+
+// Warm as cold would make the share of cold 0/0, and swapped ones would take the cold oil's valves for the warm ones.
+TEST(Validation, OilIsWarmAboveItsColdTemperature) {
+    EXPECT_EQ(oil_refusal(&Oil::warm_temperature, -9), "");
+    EXPECT_EQ(oil_refusal(&Oil::warm_temperature, -10),
+              "oil \"oil\": warm_temperature = -10; must be > cold_temperature");
+    EXPECT_EQ(oil_refusal(&Oil::cold_temperature, 91),
+              "oil \"oil\": warm_temperature = 90; must be > cold_temperature");
+}
+
+TEST(Validation, WhatOilDoesToValvesIsANumberAboveZero) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(oil_refusal(&Oil::cold_dead_time_factor, 0),
+              "oil \"oil\": cold_dead_time_factor = 0; must be > 0");
+    EXPECT_EQ(oil_refusal(&Oil::cold_valve_frequency_factor, -0.4),
+              "oil \"oil\": cold_valve_frequency_factor = -0.4; must be > 0");
+    EXPECT_EQ(oil_refusal(&Oil::fill_viscosity, 0), "oil \"oil\": fill_viscosity = 0; must be > 0");
+    EXPECT_EQ(oil_refusal(&Oil::initial_temperature, nan),
+              "oil \"oil\": initial_temperature = nan; must be finite");
+    EXPECT_EQ(oil_refusal(&Oil::cold_temperature, nan),
+              "oil \"oil\": cold_temperature = nan; must be finite");
 }
 
 // ---- converters -------------------------------------------------------------------------------------
