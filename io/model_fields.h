@@ -119,7 +119,7 @@ template <class Fields>
 void fields(Fields& f, plant::WetPlates& w) {
     f.integer("surfaces", w.surfaces, at_least_one, "number of friction surfaces");
     f.number("outer_radius_m", w.outer_radius, positive, "of the facing");
-    f.number("inner_radius_m", w.inner_radius, not_negative, "of the facing");
+    f.number("inner_radius_m", w.inner_radius, positive, "of the facing");
     f.number("piston_area_m2", w.piston_area, positive, "pressed area of the piston");
     f.number("return_pressure_bar", w.return_pressure, not_negative,
              "pressure that balances the return spring at full stroke: the kiss point");
@@ -328,7 +328,7 @@ void fields(Fields& f, plant::Engine& e) {
     f.number("friction_constant_nm", e.friction_constant, not_negative, "engine braking at standstill");
     f.number("friction_per_speed_nm_s_per_rad", e.friction_per_speed, not_negative, "its rise with speed");
     f.number("actuator_lag_s", e.actuator_lag, not_negative, "of the injected quantity");
-    f.number("turbo_instant_fraction", e.turbo_instant_fraction, fraction,
+    f.number("turbo_instant_fraction", e.turbo_instant_fraction, share,
              "share of full load without boost; 1: no turbo");
     f.number("turbo_lag_s", e.turbo_lag, not_negative, "of the boost");
     f.number("fade_from_rpm", e.fade_from, not_negative, "below it the full-load curve falls linearly …");
@@ -357,8 +357,7 @@ template <class Fields>
 void fields(Fields& f, plant::Plough& p) {
     f.link("body", p.body, "translating mass");
     f.number("soil_factor", p.soil_factor, positive, "ASABE D497: 1.0 fine, 0.70 medium, 0.45 coarse");
-    f.number("a", p.a, not_negative,
-             "draft = soil_factor·(a + b·S + c·S²)·width·depth, S in km/h, depth in cm");
+    f.number("a", p.a, positive, "draft = soil_factor·(a + b·S + c·S²)·width·depth, S in km/h, depth in cm");
     f.number("b", p.b, not_negative, "see a");
     f.number("c", p.c, not_negative, "see a");
     f.number("width_m", p.width, positive, "of the implement");

@@ -5,7 +5,7 @@
 // A piece is active on [from, until); its left limit is taken on (from, until]. Times closer than 1e-9 s to an
 // edge count as the edge, since n·h need not meet a decimal number exactly.
 // An open start (from = −1e300) has its slope reckoned from t = 0.
-// Does not model: edges inside a step are not localised; put them on the step grid.
+// Edges are breakpoints of the machine (ModelBuilder::breakpoints): no step reaches across one, wherever it lies.
 #pragma once
 
 #include "plant/description.h"

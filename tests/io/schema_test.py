@@ -61,6 +61,9 @@ refuse("a clutch without a friction law", lambda m: m["clutches"]["Fc"].pop("dry
 refuse("two actuations", lambda m: m["clutches"]["Fc"].update(constant={}))
 refuse("a ratio of 0", lambda m: m["gears"]["PR"].update(ratio=0))
 refuse("an unknown section", lambda m: m.update(cluches={}))
+refuse("plates without a hole", lambda m: m["clutches"]["F1"]["wet_plates"].update(inner_radius_m=0))
+refuse("a plough without draft", lambda m: m["ploughs"]["plough"].update(a=0))
+refuse("an engine without torque before its boost", lambda m: m["engines"]["engine"].update(turbo_instant_fraction=0))
 refuse("a converter whose pump takes endless torque",
        lambda m: m["converters"]["converter"].update(k_over_speed_ratio_rad_s_per_sqrt_nm=[[0, 6.6], [1, 0]]), converter)
 refuse("a speed ratio beyond 1",

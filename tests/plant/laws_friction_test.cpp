@@ -11,6 +11,7 @@
 #include "plant/laws/tyre.h"
 #include "plant/laws/waveform.h"
 #include "plant/laws/wheel_contact.h"
+#include "plant/plant.h"
 #include "tests/plant/parts.h"
 
 namespace shiftrig::plant {
@@ -194,6 +195,22 @@ TEST(Waveform, IsOneSidedAtItsEdges) {
     EXPECT_NEAR(waveform(wave, 0.9, Side::left) - waveform(wave, 0.9, Side::right), 6, 1e-12);
     // 3·0.3 is not the double 0.9: the edge is met all the same.
     EXPECT_EQ(waveform(wave, 3 * 0.3, Side::right), waveform(wave, 0.9, Side::right));
+}
+
+TEST(WaveformInAMachine, AnEdgeInsideAStepActsFromItsOwnTimeOn) {
+    Description d;
+    d.masses = {mass("m", 2)};
+    d.sources = {source("m", constant(8, 0.00037, 0.00282))};
+    const Model model = Model::build(d, {.step_size = 1e-3});
+    Operators operators(model);
+    State state(model);
+    Scratch scratch(model);
+    Inputs inputs(model);
+    Outputs outputs(model);
+    for (const double expected : {4 * 0.63e-3, 4 * 1.63e-3, 4 * 2.45e-3}) {
+        step(model, operators, state, inputs, outputs, scratch);
+        EXPECT_NEAR(state.speeds()[0], expected, 1e-15);
+    }
 }
 
 }  // namespace
