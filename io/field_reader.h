@@ -226,6 +226,11 @@ class FieldReader {
             values.push_back(setting(entry, entry.key));
         }
     }
+    // What somebody may look for here though it stands elsewhere.
+    void no_key(const char* key, const char* elsewhere) const {
+        if (const Entry* entry = find(key))
+            fail(context_.path, entry->mark, owner() + prefix_ + key + " is not a known key; " + elsewhere);
+    }
     // A part that another reader understands; undefined where absent.
     void raw(const char* key, YAML::Node& value, const char*) {
         if (const Entry* entry = take(key)) value.reset(entry->value);

@@ -122,6 +122,7 @@ class FieldSchema {
     void other_settings(std::vector<Setting>&, const char* text) {
         signals_ = {{"[.]", {{"type", "number"}, {"description", text}}}};
     }
+    void no_key(const char*, const char*) const {}
     void raw(const char* key, YAML::Node&, const char* text) { add(key, json::object(), text); }
 
     template <class Struct>

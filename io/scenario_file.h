@@ -118,7 +118,6 @@ struct ScenarioFile {
     int seed = 1;                        // of noise and random faults
     // Parts that others understand; undefined where absent.
     YAML::Node bus_faults{YAML::NodeType::Undefined};  // io/can
-    YAML::Node bus{YAML::NodeType::Undefined};         // the rig: bit rate and the like of the in-process bus
     YAML::Node controller{
         YAML::NodeType::Undefined};  // the rig: calibration of the built-in controller, its faults
     Expectations expect;
