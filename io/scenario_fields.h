@@ -134,7 +134,8 @@ void fields(Fields& f, ScenarioText& s) {
     f.text("model", s.model, "model file, from this file's folder");
     f.optional_text("about", s.file.description, "one line");
     f.number("duration_s", s.file.duration, positive, "simulated time");
-    f.optional_integer("seed", s.file.seed, not_negative, "of noise and random faults [1]");
+    f.optional_integer("seed", s.file.seed, not_negative,
+                       "of the noise of sensors, and of bus_faults that name no other [1]");
     f.optional_object("start", s.file.start, "state and inputs at the beginning");
     f.list("timeline", s.timeline, "what changes when");
     f.raw("bus_faults", s.file.bus_faults, "scripted faults of messages");

@@ -115,7 +115,7 @@ struct ScenarioFile {
     double duration = 0;      // [s]
     ScenarioStart start;
     std::vector<TimedSetting> timeline;  // sorted by `at`, file order where equal
-    int seed = 1;                        // of noise and random faults
+    int seed = 1;                        // of sensor noise, and of bus faults that name no other
     // Parts that others understand; undefined where absent.
     YAML::Node bus_faults{YAML::NodeType::Undefined};  // io/can
     YAML::Node controller{

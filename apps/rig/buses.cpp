@@ -17,7 +17,7 @@ Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tic
     options.command_timeout = model.controller.command_timeout;
 
     if (!setup.faults.IsNull() && mapping_) {
-        faults_ = io::can::parse_faults(setup.faults, setup.faults_file, *mapping_);
+        faults_ = io::can::parse_faults(setup.faults, setup.faults_file, *mapping_, setup.seed);
         options.can_faults = &*faults_;
         for (std::size_t i = 0; i < faults_->faults.size(); ++i) {
             plant::Signal status;

@@ -28,6 +28,7 @@ struct BusSetup {
     std::string can_log, can_replay;  // of the first CAN bus; see bus::Options
     YAML::Node faults;                // of every CAN bus (io/can/faults.h); null: none
     std::string faults_file;          // where they are written
+    std::uint64_t seed = 1;           // of those that draw and name no other
 };
 
 class Buses {

@@ -213,6 +213,51 @@ TEST(Rig, PedalReleasesTheMainClutchWhateverTheControllerSays) {
     EXPECT_NE(column(result.run, "clutch.Fc.state").back(), 0);
 }
 
+// A noisy sensor, then two seconds of it.
+std::vector<double> noisy_readings(const std::string& seed) {
+    Rig rig(make_setup(
+        {}, inline_scenario("duration_s: 2\n" + seed + "start: {inputs: {sensor.engine.noise_rpm: 20}}\n")));
+    const int reading = rig.signals().find("sensor.engine.speed");
+    std::vector<double> readings;
+    while (rig.ticks() < 200) {
+        rig.tick();
+        readings.push_back(rig.value(reading));
+    }
+    return readings;
+}
+
+TEST(Rig, ScenariosSeedIsThatOfTheNoise) {
+    const auto unsaid = noisy_readings(""), one = noisy_readings("seed: 1\n"),
+               two = noisy_readings("seed: 2\n");
+    EXPECT_EQ(unsaid, one);
+    EXPECT_EQ(two, noisy_readings("seed: 2\n"));
+    int same = 0;
+    for (std::size_t i = 0; i < one.size(); ++i) same += one[i] == two[i];
+    EXPECT_EQ(same, 0);
+}
+
+// Every other command lost, which ones is the seed's to say.
+std::vector<double> luck_of_commands(const std::string& seed, const std::string& own) {
+    Rig rig(make_setup(
+        {}, inline_scenario("duration_s: 1\n" + seed + "bus_faults: {" + own +
+                            "faults: [{fault: drop, message: ClutchCommandA, probability: 0.5}]}\n")));
+    const int status = rig.signals().find("bus.ClutchCommandA.status");
+    std::vector<double> statuses;
+    while (rig.ticks() < 1000) {
+        rig.tick();
+        statuses.push_back(rig.value(status));
+    }
+    return statuses;
+}
+
+TEST(Rig, ScenariosSeedIsThatOfBusFaultsWithoutTheirOwn) {
+    const auto unsaid = luck_of_commands("", ""), two = luck_of_commands("seed: 2\n", "");
+    EXPECT_EQ(unsaid, luck_of_commands("seed: 1\n", ""));
+    EXPECT_NE(unsaid, two);
+    EXPECT_EQ(unsaid, luck_of_commands("seed: 2\n", "seed: 1, "));
+    EXPECT_EQ(two, luck_of_commands("", "seed: 2, "));
+}
+
 TEST(Rig, CertificateOfARunKeepsTheWorstAndCountsTheTicksOfEachFlag) {
     RunCertificate run;
     plant::Certificate tick;
