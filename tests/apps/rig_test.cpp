@@ -295,5 +295,34 @@ TEST(Rig, ScenarioThatSetsAnOutputIsRefusedWithItsPlace) {
     }
 }
 
+TEST(Rig, BusFaultsThatNoBusCarriesAreRefusedWithTheirPlace) {
+    const auto refusal = [](const std::string& model, Choices choices) {
+        try {
+            Rig rig(make_setup(choices, io::parse_scenario("model: ../" + model +
+                                                               "\nduration_s: 1\n"
+                                                               "bus_faults:\n"
+                                                               "  - {fault: drop, message: ClutchCommandA}\n",
+                                                           config + "scenarios/inline.yaml")));
+            return std::string();
+        } catch (const io::InputError& error) {
+            return std::string(error.what());
+        }
+    };
+    const std::string place = config + "scenarios/inline.yaml:4:3: bus_faults: ";
+    const std::string no_bus =
+        "there is no CAN bus that they could act on; one of the buses must be inprocess, can:INTERFACE or "
+        "udpcan:GROUP:PORT";
+    Choices nobody, silent, lcm;
+    nobody.controller = silent.controller = lcm.controller = "none";
+    silent.buses = {"inprocess"};
+    lcm.buses = {"lcm:memq://"};
+    EXPECT_EQ(refusal("tractor.yaml", {}), "");
+    EXPECT_EQ(refusal("tractor.yaml", silent), "");
+    EXPECT_EQ(refusal("tractor.yaml", nobody), place + no_bus);
+    EXPECT_EQ(refusal("tractor.yaml", lcm), place + no_bus);
+    EXPECT_EQ(refusal("two_mass.yaml", {}),
+              place + config + "two_mass.yaml has no stanza `can:`, and so no bus that they could act on");
+}
+
 }  // namespace
 }  // namespace shiftrig::rig
