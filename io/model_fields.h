@@ -156,7 +156,8 @@ template <class Fields>
 void fields(Fields& f, plant::ActuationApply& a) {
     f.number("lag_s", a.lag, not_negative, "first-order lag of the application");
     f.flag("by_driver_brake", a.by_driver_brake, "true: a service brake on the driver's pedal");
-    f.optional_number("initial", a.initial, fraction, "application at the start [0]");
+    f.optional_number("initial", a.initial, fraction,
+                      "application at the start [0]; the same for all service brakes");
 }
 
 template <class Fields>
@@ -297,7 +298,8 @@ void fields(Fields& f, plant::BrixiusTyre& t) {
     f.link("body", t.body, "translating mass");
     f.number("radius_m", t.radius, positive, "rolling radius");
     f.number("mobility_number", t.mobility_number, positive,
-             "Brixius Bn: about 80 hard, 55 firm, 40 tilled, 20 soft");
+             "Brixius Bn: about 80 hard, 55 firm, 40 tilled, 20 soft; the input "
+             "environment.mobility_number is that of the first tyre and changes the others in proportion");
     f.number("relaxation_length_m", t.relaxation_length, positive, "way the force takes to follow the slip");
     f.number("slip_damping_time_s", t.slip_damping_time, not_negative, "slip-rate damping at low speed");
     f.number("weight_n", t.weight, positive, "on this contact");

@@ -47,6 +47,18 @@ TEST(Validation, TheReturnSpringOfAPistonDoesNotWeakenAlongItsStroke) {
     EXPECT_EQ(refusal(wet_clutch(5e5, 0)), "") << "without a piston nobody asks for it";
 }
 
+TEST(Validation, OnePedalHasOnePosition) {
+    Description d;
+    d.masses = {mass("left", 1), mass("right", 2)};
+    d.clutches = {clutch("front", "left", "", 500, 1, ActuationApply{0.1, true, 0.25}),
+                  clutch("rear", "right", "", 900, 1, ActuationApply{0.1, true, 0.25}),
+                  clutch("parking", "right", "", 900, 1, ActuationApply{0.1, false, 1})};
+    EXPECT_EQ(refusal(d), "");
+    std::get<ActuationApply>(d.clutches[1].actuation).initial = 0;
+    EXPECT_EQ(refusal(d),
+              "clutch \"rear\": initial = 0; must be that of \"front\", which the same pedal applies");
+}
+
 // ---- oil --------------------------------------------------------------------------------------------
 
 std::string oil_refusal(double Oil::*field, double value) {
