@@ -249,6 +249,46 @@ TEST(Trust, AnErrorOrNotAvailableInAnEnabledSlotIsNoCommandAndADisabledSlotIsZer
     EXPECT_EQ(rig.report().implausible, 1U);
 }
 
+// A field whose `when` is not met is nobody's business: torque of a TSC1 that asks for speed, and the other way round.
+TEST(Trust, AFieldThatIsNotMeantCannotMakeAMessageImplausible) {
+    TwoSides sides;
+    sides.run(0, 20, false);
+    unsigned counter = 0;
+    const auto send = [&](int ms, std::uint8_t mode, std::uint16_t raw_speed, std::uint8_t raw_torque) {
+        Frame frame;
+        frame.id = 0x0C000003;
+        frame.extended = true;
+        frame.length = 8;
+        const dbc::Message& layout = *sides.mapping.database.find("TSC1");
+        const auto put = [&](const char* signal, std::uint64_t raw) {
+            SignalCodec(*layout.find(signal), true).put(frame.data.data(), raw);
+        };
+        frame.data.fill(0xFF);
+        put("OverrideControlMode", mode);
+        put("RequestedSpeed", raw_speed);
+        put("RequestedTorque", raw_torque);
+        put("Counter", counter);
+        put("Checksum", tsc1_checksum(frame.id, frame.data.data(), counter));
+        counter = (counter + 1) % 8;
+        sides.bus.end(2).send(ms * kMs, frame);
+        sides.tick(ms * kMs, false);
+    };
+    const auto implausible = [&] {
+        for (const auto& report : sides.rig_link.report())
+            if (report.name == "TSC1") return report.implausible;
+        return std::uint64_t{99};
+    };
+    send(20, 1, 12000, 0);  // 1500 rpm; the torque byte, were it meant, is −125 %
+    EXPECT_EQ(sides.rig_value("engine.engine.speed_request_enable"), 1);
+    EXPECT_NEAR(sides.rig_value("engine.engine.speed_request"), 1500 * kRpm, 1e-9);
+    EXPECT_EQ(sides.rig_value("engine.engine.torque_limit"), 1);
+    EXPECT_EQ(implausible(), 0U);
+
+    send(30, 2, 12000, 0);  // here it is meant
+    EXPECT_EQ(implausible(), 1U);
+    EXPECT_EQ(sides.rig_value("engine.engine.speed_request_enable"), 1) << "the last one that was trusted";
+}
+
 TEST(Trust, SilenceEndsInLostWithinTheTimeoutAndFramesBringItBack) {
     TwoSides sides;
     value(sides.tcu, "clutch.F1.pressure_command") = 8e5;
