@@ -122,6 +122,12 @@ bool Buses::next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME {
     return false;
 }
 
+bool Buses::end_logs() {
+    bool whole = true;
+    for (auto& each : buses_) whole = each.end_log() && whole;
+    return whole;
+}
+
 std::uint64_t Buses::messages_lost() const SHIFTRIG_REALTIME {
     std::uint64_t lost = 0;
     for (const auto& each : buses_) lost += each.messages_lost();

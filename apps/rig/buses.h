@@ -59,6 +59,8 @@ class Buses {
     // See bus::Bus; of any bus.
     bool next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME;
 
+    // After the run: closes the logs of frames; false if one is not whole, as summary() tells.
+    bool end_logs();
     std::uint64_t messages_lost() const SHIFTRIG_REALTIME;
     std::vector<std::string> warnings() const;
     std::vector<std::string> summary() const;

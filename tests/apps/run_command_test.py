@@ -245,6 +245,11 @@ class Results(InAFolder):
         for one, other in zip(first["shifts"], second["shifts"]):
             self.assertAlmostEqual(one["ended_s"], other["ended_s"], delta=0.02)
 
+    def test_a_log_that_does_not_fit_the_disk_fails_the_run(self):
+        done = run("--scenario", SHIFT, "--pace", "free", "--can-log", "/dev/full")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("/dev/full: cannot be written: No space left on device", done.stderr.splitlines())
+
     def test_sigint_ends_the_run_with_everything_recorded(self):
         recording = self.path("cut.lcmlog")
         process = subprocess.Popen([SHIFTRIG, "run", "--scenario", SHIFT, "--pace", "wall", "--factor", "0.1", "--json",
