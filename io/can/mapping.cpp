@@ -248,7 +248,7 @@ class Reader {
         const auto [rest, error] = std::from_chars(written.data(), written.data() + written.size(), value);
         const auto unit =
             unit_conversion({rest, static_cast<std::size_t>(written.data() + written.size() - rest)});
-        if (error != std::errc{} || !unit)
+        if (error != std::errc{} || !unit || !std::isfinite(value))
             fail(node, "\"" + written + "\" is not a number with a unit, such as 1201 Nm");
         return {value * unit->factor + unit->offset, unit->unit};
     }

@@ -558,6 +558,8 @@ TEST_F(Configuration, TimesAndRatesAreBounded) {
               "small.yaml:4:22: phase_ms = -1; must be within 0 and 86400000");
     EXPECT_EQ(error_of("  Speeds: {signals: {Engine: {constant: inf}}}\n"),
               "small.yaml:4:41: \"inf\" must be a finite number");
+    EXPECT_EQ(error_of("  Speeds: {signals: {Engine: {signal: engine.engine.torque, per: inf Nm}}}\n"),
+              "small.yaml:4:66: \"inf Nm\" is not a number with a unit, such as 1201 Nm");
     EXPECT_EQ(error_of("  Speeds: {}\nbit_rate: inf\n"),
               "small.yaml:5:11: bit_rate = inf; must be within 1000 and 1000000000");
 
