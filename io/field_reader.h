@@ -125,12 +125,12 @@ class FieldReader {
     // ---- tables --------------------------------------------------------------------------------------
     // [[x, y], …], x rising; the units of both columns stand in the key, their factors are given here.
     void table(const char* key, std::vector<std::pair<double, double>>& points, double x_factor,
-               double y_factor, const char*) {
-        if (const Entry* entry = required(key)) read_table(*entry, key, points, x_factor, y_factor);
+               double y_factor, const char*, const Columns& columns = {}) {
+        if (const Entry* entry = required(key)) read_table(*entry, key, points, x_factor, y_factor, columns);
     }
     void optional_table(const char* key, std::vector<std::pair<double, double>>& points, double x_factor,
-                        double y_factor, const char*) {
-        if (const Entry* entry = take(key)) read_table(*entry, key, points, x_factor, y_factor);
+                        double y_factor, const char*, const Columns& columns = {}) {
+        if (const Entry* entry = take(key)) read_table(*entry, key, points, x_factor, y_factor, columns);
     }
     // {name: number, …}
     void named_numbers(const char* key, std::vector<std::pair<std::string, double>>& values, const Rule& rule,
@@ -226,6 +226,11 @@ class FieldReader {
             values.push_back(setting(entry, entry.key));
         }
     }
+    // What somebody may look for here though it stands elsewhere.
+    void no_key(const char* key, const char* elsewhere) const {
+        if (const Entry* entry = find(key))
+            fail(context_.path, entry->mark, owner() + prefix_ + key + " is not a known key; " + elsewhere);
+    }
     // A part that another reader understands; undefined where absent.
     void raw(const char* key, YAML::Node& value, const char*) {
         if (const Entry* entry = take(key)) value.reset(entry->value);
@@ -291,22 +296,25 @@ class FieldReader {
         return entry.value.Scalar();
     }
     void read_table(const Entry& entry, const char* key, std::vector<std::pair<double, double>>& points,
-                    double x_factor, double y_factor) const {
+                    double x_factor, double y_factor, const Columns& columns) const {
         if (!entry.value.IsSequence() || entry.value.size() < 2)
             refuse(entry, key, "must be a list of at least two pairs [x, y]");
         for (const auto& row : entry.value) {
+            const auto refuse_row = [&](const std::string& rule) {
+                fail(context_.path, row.Mark(),
+                     owner() + prefix_ + key + " = " + as_written(row) + "; " + rule);
+            };
             std::pair<double, double> point;
             if (!row.IsSequence() || row.size() != 2 || !YAML::convert<double>::decode(row[0], point.first) ||
                 !YAML::convert<double>::decode(row[1], point.second) || !rules::any.holds(point.first) ||
                 !rules::any.holds(point.second))
-                fail(
-                    context_.path, row.Mark(),
-                    owner() + prefix_ + key + " = " + as_written(row) + "; must be a pair of numbers [x, y]");
+                refuse_row("must be a pair of numbers [x, y]");
+            if (!columns.x.holds(point.first)) refuse_row("x " + columns.x.words());
+            if (!columns.y.holds(point.second)) refuse_row("y " + columns.y.words());
             point.first *= x_factor;
             point.second *= y_factor;
             if (!points.empty() && point.first <= points.back().first)
-                fail(context_.path, row.Mark(),
-                     owner() + prefix_ + key + " = " + as_written(row) + "; x must rise from pair to pair");
+                refuse_row("x must rise from pair to pair");
             points.push_back(point);
         }
     }

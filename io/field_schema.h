@@ -57,12 +57,13 @@ class FieldSchema {
         require(key, {{"type", "array"}, {"items", word()}}, text);
     }
 
-    void table(const char* key, std::vector<std::pair<double, double>>&, double, double, const char* text) {
-        require(key, pairs(), text);
+    void table(const char* key, std::vector<std::pair<double, double>>&, double, double, const char* text,
+               const Columns& columns = {}) {
+        require(key, pairs(columns), text);
     }
     void optional_table(const char* key, std::vector<std::pair<double, double>>&, double, double,
-                        const char* text) {
-        add(key, pairs(), text);
+                        const char* text, const Columns& columns = {}) {
+        add(key, pairs(columns), text);
     }
     void named_numbers(const char* key, std::vector<std::pair<std::string, double>>&, const Rule& rule,
                        const char* text) {
@@ -121,6 +122,7 @@ class FieldSchema {
     void other_settings(std::vector<Setting>&, const char* text) {
         signals_ = {{"[.]", {{"type", "number"}, {"description", text}}}};
     }
+    void no_key(const char*, const char*) const {}
     void raw(const char* key, YAML::Node&, const char* text) { add(key, json::object(), text); }
 
     template <class Struct>
@@ -133,9 +135,9 @@ class FieldSchema {
 
   private:
     static json word() { return {{"type", "string"}, {"minLength", 1}}; }
-    static json pairs() {
-        const json pair = {
-            {"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}};
+    static json pairs(const Columns& columns) {
+        const json both = json::array({bounded("number", columns.x), bounded("number", columns.y)});
+        const json pair = {{"type", "array"}, {"items", both}, {"minItems", 2}, {"maxItems", 2}};
         return {{"type", "array"}, {"items", pair}, {"minItems", 2}};
     }
     static json bounded(const char* type, const Rule& rule) {

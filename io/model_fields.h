@@ -119,7 +119,7 @@ template <class Fields>
 void fields(Fields& f, plant::WetPlates& w) {
     f.integer("surfaces", w.surfaces, at_least_one, "number of friction surfaces");
     f.number("outer_radius_m", w.outer_radius, positive, "of the facing");
-    f.number("inner_radius_m", w.inner_radius, not_negative, "of the facing");
+    f.number("inner_radius_m", w.inner_radius, positive, "of the facing");
     f.number("piston_area_m2", w.piston_area, positive, "pressed area of the piston");
     f.number("return_pressure_bar", w.return_pressure, not_negative,
              "pressure that balances the return spring at full stroke: the kiss point");
@@ -156,7 +156,8 @@ template <class Fields>
 void fields(Fields& f, plant::ActuationApply& a) {
     f.number("lag_s", a.lag, not_negative, "first-order lag of the application");
     f.flag("by_driver_brake", a.by_driver_brake, "true: a service brake on the driver's pedal");
-    f.optional_number("initial", a.initial, fraction, "application at the start [0]");
+    f.optional_number("initial", a.initial, fraction,
+                      "application at the start [0]; the same for all service brakes");
 }
 
 template <class Fields>
@@ -172,7 +173,8 @@ void fields(Fields& f, plant::ActuationHydraulic& h) {
     f.number("damping_ratio", h.damping_ratio, positive, "of the valve");
     f.number("slew_bar_per_s", h.slew, positive, "steepest change of pressure");
     f.number("maximum_pressure_bar", h.maximum_pressure, positive, "of the supply");
-    f.number("preload_pressure_bar", h.preload_pressure, not_negative, "return spring at zero stroke");
+    f.number("preload_pressure_bar", h.preload_pressure, not_negative,
+             "return spring at zero stroke; at most return_pressure_bar");
     f.number("stroke_mm", h.stroke, not_negative,
              "of the piston to the kiss point; 0 with fill_volume 0: no fill");
     f.number("fill_volume_cm3", h.fill_volume, not_negative, "oil that the stroke takes");
@@ -296,7 +298,8 @@ void fields(Fields& f, plant::BrixiusTyre& t) {
     f.link("body", t.body, "translating mass");
     f.number("radius_m", t.radius, positive, "rolling radius");
     f.number("mobility_number", t.mobility_number, positive,
-             "Brixius Bn: about 80 hard, 55 firm, 40 tilled, 20 soft");
+             "Brixius Bn: about 80 hard, 55 firm, 40 tilled, 20 soft; the input "
+             "environment.mobility_number is that of the first tyre and changes the others in proportion");
     f.number("relaxation_length_m", t.relaxation_length, positive, "way the force takes to follow the slip");
     f.number("slip_damping_time_s", t.slip_damping_time, not_negative, "slip-rate damping at low speed");
     f.number("weight_n", t.weight, positive, "on this contact");
@@ -309,9 +312,10 @@ void fields(Fields& f, plant::TorqueConverter& c) {
     f.link("pump", c.pump, "driving mass");
     f.link("turbine", c.turbine, "driven mass");
     f.table("k_over_speed_ratio_rad_s_per_sqrt_nm", c.k_over_speed_ratio, 1, 1,
-            "[[turbine/pump speed, K = ω/√T], …]");
+            "[[turbine/pump speed, K = ω/√T], …]", {fraction, positive});
     f.table("torque_ratio_over_speed_ratio", c.torque_ratio_over_speed_ratio, 1, 1,
-            "[[turbine/pump speed, turbine/pump torque], …]");
+            "[[turbine/pump speed, turbine/pump torque], …]; their product nowhere beyond 1",
+            {fraction, not_negative});
 }
 
 template <class Fields>
@@ -326,7 +330,7 @@ void fields(Fields& f, plant::Engine& e) {
     f.number("friction_constant_nm", e.friction_constant, not_negative, "engine braking at standstill");
     f.number("friction_per_speed_nm_s_per_rad", e.friction_per_speed, not_negative, "its rise with speed");
     f.number("actuator_lag_s", e.actuator_lag, not_negative, "of the injected quantity");
-    f.number("turbo_instant_fraction", e.turbo_instant_fraction, fraction,
+    f.number("turbo_instant_fraction", e.turbo_instant_fraction, share,
              "share of full load without boost; 1: no turbo");
     f.number("turbo_lag_s", e.turbo_lag, not_negative, "of the boost");
     f.number("fade_from_rpm", e.fade_from, not_negative, "below it the full-load curve falls linearly …");
@@ -355,8 +359,7 @@ template <class Fields>
 void fields(Fields& f, plant::Plough& p) {
     f.link("body", p.body, "translating mass");
     f.number("soil_factor", p.soil_factor, positive, "ASABE D497: 1.0 fine, 0.70 medium, 0.45 coarse");
-    f.number("a", p.a, not_negative,
-             "draft = soil_factor·(a + b·S + c·S²)·width·depth, S in km/h, depth in cm");
+    f.number("a", p.a, positive, "draft = soil_factor·(a + b·S + c·S²)·width·depth, S in km/h, depth in cm");
     f.number("b", p.b, not_negative, "see a");
     f.number("c", p.c, not_negative, "see a");
     f.number("width_m", p.width, positive, "of the implement");
@@ -375,7 +378,7 @@ void fields(Fields& f, plant::Oil& o) {
              "drag is linear up to this slip, constant above");
     f.number("cold_temperature_degc", o.cold_temperature, any, "where the two factors below hold");
     f.number("warm_temperature_degc", o.warm_temperature, any,
-             "where they are 1; between, by ln of the viscosity");
+             "where they are 1, above cold_temperature_degc; between, by ln of the viscosity");
     f.number("cold_dead_time_factor", o.cold_dead_time_factor, positive, "on the valves' dead time");
     f.number("cold_valve_frequency_factor", o.cold_valve_frequency_factor, positive,
              "on the valves' frequency");

@@ -21,6 +21,11 @@ struct Rule {
     std::string words() const;  // "must be > 0"
 };
 
+// Of a table [[x, y], …]; that x rises goes without saying.
+struct Columns {
+    Rule x, y;
+};
+
 namespace rules {
 inline constexpr double unbounded = std::numeric_limits<double>::infinity();
 inline constexpr Rule any{};

@@ -134,11 +134,12 @@ void fields(Fields& f, ScenarioText& s) {
     f.text("model", s.model, "model file, from this file's folder");
     f.optional_text("about", s.file.description, "one line");
     f.number("duration_s", s.file.duration, positive, "simulated time");
-    f.optional_integer("seed", s.file.seed, not_negative, "of noise and random faults [1]");
+    f.optional_integer("seed", s.file.seed, not_negative,
+                       "of the noise of sensors, and of bus_faults that name no other [1]");
     f.optional_object("start", s.file.start, "state and inputs at the beginning");
     f.list("timeline", s.timeline, "what changes when");
     f.raw("bus_faults", s.file.bus_faults, "scripted faults of messages");
-    f.raw("bus", s.file.bus, "settings of the in-process bus");
+    f.no_key("bus", "the bit rate of the in-process bus stands under bus_faults (bit_rate)");
     f.raw("controller", s.file.controller, "calibration and faults of the built-in controller");
     f.optional_object("expect", s.expect, "what shiftrig test checks");
 }

@@ -115,10 +115,9 @@ struct ScenarioFile {
     double duration = 0;      // [s]
     ScenarioStart start;
     std::vector<TimedSetting> timeline;  // sorted by `at`, file order where equal
-    int seed = 1;                        // of noise and random faults
+    int seed = 1;                        // of sensor noise, and of bus faults that name no other
     // Parts that others understand; undefined where absent.
     YAML::Node bus_faults{YAML::NodeType::Undefined};  // io/can
-    YAML::Node bus{YAML::NodeType::Undefined};         // the rig: bit rate and the like of the in-process bus
     YAML::Node controller{
         YAML::NodeType::Undefined};  // the rig: calibration of the built-in controller, its faults
     Expectations expect;

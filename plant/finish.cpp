@@ -15,7 +15,7 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-constexpr std::uint64_t noise_seed = 0x5ee0;  // sensors draw from their own streams of it
+constexpr std::uint64_t noise_seed = 0x5edf;  // plus the model's; sensors draw from their own streams of it
 
 void load_sample(const ModelData& m, const double* block, double time, Sample& s) {
     std::copy(block + m.layout.speeds, block + m.layout.speeds + m.masses, s.z);
@@ -159,10 +159,11 @@ void pick_up_slowly(Work& w, const SensorSlots& slots, const double* begin_speed
 
 void disturb_readings(Work& w, const SensorSlots& slots) {
     const auto count = static_cast<std::uint64_t>(read_integer(w.next) + 1);
+    const std::uint64_t seed = noise_seed + w.model.options.seed;
     for (std::size_t i = 0; i < w.model.sensors.size(); ++i) {
         const SensorFaults& faults = w.operators.sensor_faults[i];
         SensorState state{0, 0, slots.reading[i], slots.output[i]};
-        sensor_output(state, faults, faults.noise > 0 ? noise(noise_seed, i, count) : 0);
+        sensor_output(state, faults, faults.noise > 0 ? noise(seed, i, count) : 0);
         slots.output[i] = state.output;
     }
 }

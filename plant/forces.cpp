@@ -140,7 +140,8 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
             value != value ? signal.initial : std::clamp(value, signal.minimum, signal.maximum);
     }
     for (std::size_t t = 0; t < m.tyres.size(); ++t) {
-        w.operators.soils[t] = tyre_soil(m.description.tyres[t], input(w, m.tyres[t].mobility));
+        const TyreLaw& law = m.tyres[t];
+        w.operators.soils[t] = tyre_soil(m.description.tyres[t], law.share * input(w, law.mobility));
     }
     for (std::size_t e = 0; e < m.engines.size(); ++e) {
         const EngineLaw& engine = m.engines[e];

@@ -296,6 +296,9 @@ Model Model::build(const Description& description, const BuildOptions& options) 
 double Model::step_size() const noexcept {
     return data_->options.step_size;
 }
+std::uint64_t Model::seed() const noexcept {
+    return data_->options.seed;
+}
 std::string_view Model::kernel() const noexcept {
     return data_->kernel.name;
 }

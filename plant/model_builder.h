@@ -15,7 +15,7 @@ class ModelBuilder {
 
     ModelData& model;  // description and structure are complete, and everything that follows from them alone
 
-    // Index of an input; several devices may share one, whose initial value and range are those of the first.
+    // Index of an input; several devices may share one, with the same initial value and range.
     int input(const std::string& name, Unit unit, double initial, double minimum, double maximum,
               const std::string& description);
     // 0 or 1.

@@ -60,6 +60,7 @@ struct TyreLaw {
     int wheel = -1, body = -1, mobility = -1;
     int wheel_force = -1, body_force = -1;
     int resistance = -1;  // friction pair of the body
+    double share = 1;     // its mobility number over that of the first tyre, which the input means
 };
 struct ConverterLaw {
     int pump = -1, turbine = -1;

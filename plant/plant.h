@@ -104,6 +104,7 @@ enum class KernelKind { automatic, portable, avx2, avx512 };
 struct BuildOptions {
     double step_size = 1e-3;  // h [s]
     KernelKind kernel = KernelKind::automatic;
+    std::uint64_t seed = 1;  // of the noise of sensors
 };
 
 namespace detail {
@@ -121,6 +122,7 @@ class Model {
     ~Model();
 
     double step_size() const noexcept;
+    std::uint64_t seed() const noexcept;
     std::string_view kernel() const noexcept;         // "portable", "avx2", "avx512"
     std::string_view engine() const noexcept;         // "etd3", "ark3"
     std::string_view engine_reason() const noexcept;  // why this one, in words

@@ -117,10 +117,20 @@ void validate(const Description& d) {
     between_one_and(Description::most_parts, "maximum_parts", d.maximum_parts);
     if (d.oil) {
         const Check check("oil", "oil");
-        check.positive("viscosity_at_zero", d.oil->viscosity_at_zero);
-        check.not_negative("viscosity_decay", d.oil->viscosity_decay);
-        check.positive("drag_speed_limit", d.oil->drag_speed_limit);
-        check.not_negative("pump_flow", d.oil->pump_flow);
+        const Oil& oil = *d.oil;
+        check.positive("viscosity_at_zero", oil.viscosity_at_zero);
+        check.not_negative("viscosity_decay", oil.viscosity_decay);
+        check.any("initial_temperature", oil.initial_temperature);
+        check.positive("drag_speed_limit", oil.drag_speed_limit);
+        check.any("cold_temperature", oil.cold_temperature);
+        check.any("warm_temperature", oil.warm_temperature);
+        if (!(oil.warm_temperature > oil.cold_temperature))
+            check.fail("warm_temperature",
+                       "= " + number(oil.warm_temperature) + "; must be > cold_temperature");
+        check.positive("cold_dead_time_factor", oil.cold_dead_time_factor);
+        check.positive("cold_valve_frequency_factor", oil.cold_valve_frequency_factor);
+        check.positive("fill_viscosity", oil.fill_viscosity);
+        check.not_negative("pump_flow", oil.pump_flow);
     }
     for_each_connector(d, [&](const auto& device) { check_surroundings(d, device); });
 }

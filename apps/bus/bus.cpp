@@ -1,6 +1,5 @@
 #include "apps/bus/bus.h"
 
-#include "io/can/candump.h"
 #include "io/can/open_port.h"
 #include "io/input_error.h"
 
@@ -66,10 +65,17 @@ void Bus::join_can(io::can::CanPort& wire, const io::can::Mapping& mapping, io::
     }
     if (!options.can_log.empty()) {
         const std::string interface = name_.starts_with("can:") ? name_.substr(4) : "can0";
-        owned_.push_back(std::make_unique<io::can::CandumpLogger>(*port_, options.can_log, interface));
-        port_ = owned_.back().get();
+        auto log = std::make_unique<io::can::CandumpLogger>(*port_, options.can_log, interface);
+        port_ = log_ = log.get();
+        owned_.push_back(std::move(log));
     }
     can_.emplace(mapping, *port_, signals, can);
+}
+
+bool Bus::end_log() {
+    if (!log_) return true;
+    log_->finish();
+    return log_->error().empty() && log_->lost() == 0;
 }
 
 std::uint64_t Bus::messages_lost() const SHIFTRIG_REALTIME {
@@ -122,7 +128,9 @@ std::vector<std::string> Bus::summary() const {
                        {"malformed", c.malformed},
                        {"error frames", c.error_frames},
                        {"times bus-off", c.bus_off_events},
-                       {"reconnects", c.reconnects}});
+                       {"reconnects", c.reconnects},
+                       {"frames missing in the log, whose writer did not keep up", log_ ? log_->lost() : 0}});
+    if (log_ && !log_->error().empty()) lines.push_back(log_->error());
     return lines;
 }
 

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "io/can/candump.h"
 #include "io/can/faults.h"
 #include "io/can/inprocess.h"
 #include "io/can/link.h"
@@ -90,6 +91,9 @@ class Bus {
         if (faulty_) faulty_->archive(a);
     }
 
+    // Closes the log of frames; false if some of them are not in it, as summary() tells.
+    bool end_log();
+
     const std::string& name() const noexcept { return name_; }
     std::uint64_t messages_lost() const SHIFTRIG_REALTIME;  // known to be lost, either way
     std::vector<std::string> warnings() const;              // at start
@@ -106,6 +110,7 @@ class Bus {
     io::can::CanPort* wire_ = nullptr;       // the innermost, if it is a real one
     io::can::CanPort* port_ = nullptr;       // the outermost; null: LCM
     io::can::FaultyPort* faulty_ = nullptr;  // one of them, if there are faults
+    io::can::CandumpLogger* log_ = nullptr;  // the outermost, if a log is written
     std::optional<io::can::CanLink> can_;
     std::optional<io::lcm::LcmLink> lcm_;
 };

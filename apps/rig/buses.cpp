@@ -1,10 +1,29 @@
 #include "apps/rig/buses.h"
 
+#include <algorithm>
 #include <stdexcept>
 
+#include "io/yaml_document.h"
 #include "rt/clock.h"
 
 namespace shiftrig::rig {
+
+namespace {
+
+// Faults that no bus carries would be read by nobody: who wrote them waits for them in vain.
+void require_a_carrier(const BusSetup& setup, const io::ModelFile& model) {
+    const auto is_can = [](const std::string& name) { return !name.starts_with("lcm:"); };
+    if (!model.can.IsDefined())
+        io::fail(setup.faults_file, setup.faults.Mark(),
+                 "bus_faults: " + model.path + " has no stanza `can:`, and so no bus that they could act on");
+    if (std::none_of(setup.names.begin(), setup.names.end(), is_can))
+        io::fail(
+            setup.faults_file, setup.faults.Mark(),
+            "bus_faults: there is no CAN bus that they could act on; one of the buses must be inprocess, "
+            "can:INTERFACE or udpcan:GROUP:PORT");
+}
+
+}  // namespace
 
 Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tick_ns,
              io::SignalTable& signals)
@@ -16,8 +35,9 @@ Buses::Buses(const BusSetup& setup, const io::ModelFile& model, std::int64_t tic
     options.model_name = model.description.name;
     options.command_timeout = model.controller.command_timeout;
 
-    if (!setup.faults.IsNull() && mapping_) {
-        faults_ = io::can::parse_faults(setup.faults, setup.faults_file, *mapping_);
+    if (!setup.faults.IsNull()) {
+        require_a_carrier(setup, model);
+        faults_ = io::can::parse_faults(setup.faults, setup.faults_file, *mapping_, setup.seed);
         options.can_faults = &*faults_;
         for (std::size_t i = 0; i < faults_->faults.size(); ++i) {
             plant::Signal status;
@@ -100,6 +120,12 @@ bool Buses::next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME {
     for (auto& each : buses_)
         if (each.next_command_latency(latency_ns)) return true;
     return false;
+}
+
+bool Buses::end_logs() {
+    bool whole = true;
+    for (auto& each : buses_) whole = each.end_log() && whole;
+    return whole;
 }
 
 std::uint64_t Buses::messages_lost() const SHIFTRIG_REALTIME {

@@ -28,6 +28,7 @@ struct BusSetup {
     std::string can_log, can_replay;  // of the first CAN bus; see bus::Options
     YAML::Node faults;                // of every CAN bus (io/can/faults.h); null: none
     std::string faults_file;          // where they are written
+    std::uint64_t seed = 1;           // of those that draw and name no other
 };
 
 class Buses {
@@ -59,6 +60,8 @@ class Buses {
     // See bus::Bus; of any bus.
     bool next_command_latency(std::int64_t& latency_ns) SHIFTRIG_REALTIME;
 
+    // After the run: closes the logs of frames; false if one is not whole, as summary() tells.
+    bool end_logs();
     std::uint64_t messages_lost() const SHIFTRIG_REALTIME;
     std::vector<std::string> warnings() const;
     std::vector<std::string> summary() const;

@@ -10,14 +10,16 @@ plant::Model build(const Setup& setup) {
     plant::BuildOptions options;
     options.step_size = static_cast<double>(setup.tick_ns) * 1e-9 / setup.substeps;
     options.kernel = setup.kernel;
+    if (setup.scenario) options.seed = static_cast<std::uint64_t>(setup.scenario->seed);
     return io::build_model(setup.model, options);
 }
 
-// Chooses the scenario's gear options before the model is built.
+// What the scenario chooses before anything is built: gear options, and the seed of what is drawn at random.
 Setup with_options(Setup setup) {
-    if (setup.scenario)
-        for (const auto& [gear, option] : setup.scenario->start.options)
-            io::select_option(setup.model.description, gear, option);
+    if (!setup.scenario) return setup;
+    for (const auto& [gear, option] : setup.scenario->start.options)
+        io::select_option(setup.model.description, gear, option);
+    setup.buses.seed = static_cast<std::uint64_t>(setup.scenario->seed);
     return setup;
 }
 

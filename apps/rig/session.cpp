@@ -115,6 +115,7 @@ io::Manifest manifest_of(const Rig& rig, const rt::LoopSettings& loop) {
     m.substeps = setup.substeps;
     m.tick_ns = setup.tick_ns;
     m.kernel = model.kernel();
+    m.seed = model.seed();
     m.first_tick = rig.ticks();
     m.wall_clock = loop.pace == rt::Pace::wall;
     m.inputs = model.inputs();

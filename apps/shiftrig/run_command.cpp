@@ -289,7 +289,8 @@ int run(const RunOptions& options) {
     }
     controller.reset();
 
-    const bool whole = finish(options, beside);
+    const bool frames_logged = rig.buses().end_logs();
+    const bool whole = finish(options, beside) && frames_logged;
     for (const auto& refusal : refusals)
         std::cerr << "this machine does not grant " << rt::to_string(refusal) << '\n';
     for (const auto& line : rig.buses().summary()) std::cerr << line << '\n';

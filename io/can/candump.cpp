@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <thread>
 
@@ -162,14 +164,26 @@ struct CandumpLogger::Data {
         std::int64_t time_ns;
         Direction direction;
     };
-    Data(CanPort& a_port, const std::string& path, std::string an_interface)
-        : port(a_port), interface(std::move(an_interface)), out(path, std::ios::binary | std::ios::trunc) {
+    Data(CanPort& a_port, const std::string& a_path, std::string an_interface)
+        : port(a_port),
+          path(a_path),
+          interface(std::move(an_interface)),
+          out(path, std::ios::binary | std::ios::trunc) {
         if (!out) throw InputError(path, 0, 0, "cannot be written");
         writer = std::thread([this] { write(); });
     }
-    ~Data() {
+    ~Data() { finish(); }
+    void finish() {
+        if (!writer.joinable()) return;
         stop = true;
         writer.join();
+        errno = 0;
+        out.close();
+        check();
+    }
+    // What the disk refused once leaves a hole: nothing is written behind it.
+    void check() {
+        if (!out && failure == 0) failure = errno != 0 ? errno : EIO;
     }
     SHIFTRIG_TRUSTED_BEGIN  // try_enqueue never allocates
         void
@@ -187,16 +201,19 @@ struct CandumpLogger::Data {
             last = stop;  // read before the queue is emptied: nothing noted before the stop is left behind
             while (queue.try_dequeue(item))
                 append_candump_line(text, item.frame, item.time_ns, interface, item.direction);
-            out << text;
+            errno = 0;
+            out << text;  // into a stream that has failed: nowhere
             out.flush();
+            check();
             text.clear();
             if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(20));
         }
     }
 
     CanPort& port;
-    std::string interface;
+    std::string path, interface;
     std::ofstream out;
+    std::atomic<int> failure{0};  // errno of the first write that went wrong
     moodycamel::ReaderWriterQueue<Item> queue{1 << 16};
     std::atomic<std::uint64_t> lost{0};
     std::atomic<bool> stop{false};
@@ -228,6 +245,13 @@ bool CandumpLogger::wait(std::int64_t timeout_ns) noexcept {
 }
 const std::string& CandumpLogger::description() const noexcept {
     return data_->port.description();
+}
+void CandumpLogger::finish() {
+    data_->finish();
+}
+std::string CandumpLogger::error() const {
+    const int failure = data_->failure;
+    return failure == 0 ? "" : data_->path + ": cannot be written: " + std::strerror(failure);
 }
 std::uint64_t CandumpLogger::lost() const noexcept {
     return data_->lost;

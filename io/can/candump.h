@@ -46,6 +46,11 @@ class CandumpLogger final : public CanPort {
     PortCounters counters() const SHIFTRIG_REALTIME override;
     bool wait(std::int64_t timeout_ns) noexcept override;
     const std::string& description() const noexcept override;
+    // Writes what is left and closes the file: from then on error() and lost() tell whether all of it is there, and nothing more
+    // is logged.
+    void finish();
+    // One line that begins with the path; empty: everything could be written so far.
+    std::string error() const;
     // Entries that found the writer's queue full.
     std::uint64_t lost() const noexcept;
 

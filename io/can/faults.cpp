@@ -119,8 +119,9 @@ void FaultyPort::advance(std::int64_t now_ns) SHIFTRIG_REALTIME {
         }
     }
     Frame frame;
-    while (take(now_ns, Way::sent, frame))
-        if (!off_) port_.send(now_ns, frame);
+    while (take(now_ns, Way::sent, frame)) off_ ? void(++dropped_sending_) : void(port_.send(now_ns, frame));
+    // What arrives while nobody listens is lost, however long it was under way.
+    while (off_ && take(now_ns, Way::received, frame)) ++dropped_receiving_;
 }
 
 SHIFTRIG_TRUSTED_BEGIN

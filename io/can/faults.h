@@ -1,8 +1,8 @@
 // A bus that misbehaves on purpose: a decorator over any port that drops, delays, doubles, corrupts … frames by
 // simulated time and from a seed, so that a run with faults is as repeatable as one without.
 //
-//     bus_faults:                       # of a scenario; or the list alone, with seed 1
-//       seed: 7
+//     bus_faults:                       # of a scenario; or the list alone
+//       seed: 7                         # [the scenario's]
 //       bit_rate: 250000                # the in-process bus with arbitration and the true length of frames
 //       faults:
 //         - {fault: drop, message: ClutchCommandA, from_s: 2, until_s: 2.5, probability: 0.3}
@@ -66,7 +66,9 @@ struct FaultPlan {
 };
 
 // Throws InputError naming file, line, column and rule; messages and signals must exist in the mapping's DBC.
-FaultPlan parse_faults(const YAML::Node& node, const std::string& file, const Mapping& mapping);
+// `seed` is the plan's where the faults name none.
+FaultPlan parse_faults(const YAML::Node& node, const std::string& file, const Mapping& mapping,
+                       std::uint64_t seed = 1);
 
 // One line for events: `drop ClutchCommandA`.
 std::string describe(const BusFault& fault);

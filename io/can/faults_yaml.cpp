@@ -29,8 +29,9 @@ class Reader {
   public:
     Reader(const std::string& file, const Mapping& mapping) : file_(file), mapping_(mapping) {}
 
-    FaultPlan plan(const YAML::Node& node) const {
+    FaultPlan plan(const YAML::Node& node, std::uint64_t seed) const {
         FaultPlan plan;
+        plan.seed = seed;
         if (node.IsMap()) {
             for (const auto& entry : node)
                 if (const auto key = entry.first.Scalar();
@@ -143,8 +144,9 @@ class Reader {
 
 }  // namespace
 
-FaultPlan parse_faults(const YAML::Node& node, const std::string& file, const Mapping& mapping) {
-    return Reader(file, mapping).plan(node);
+FaultPlan parse_faults(const YAML::Node& node, const std::string& file, const Mapping& mapping,
+                       std::uint64_t seed) {
+    return Reader(file, mapping).plan(node, seed);
 }
 
 std::string describe(const BusFault& fault) {

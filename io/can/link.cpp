@@ -103,6 +103,7 @@ bool CanLink::Data::plausible(const ReceivedMessage& message, const Frame& frame
     for (const Field& field : message.fields) {
         if (field.use == Use::one_of) continue;
         if (field.enable && field.enable->raw(data) == 0) continue;
+        if (!field.is_meant(data)) continue;
         const auto holds = [data](const Selection& s) { return s.holds(data); };
         if (!std::all_of(field.selected.begin(), field.selected.end(), holds)) continue;
         const std::uint64_t raw = field.codec.raw(data);
@@ -130,8 +131,7 @@ void CanLink::Data::decode(const ReceivedMessage& message, const Frame& frame,
             value = raw == field.is ? 1 : 0;
         } else if (field.enable && field.enable->raw(data) == 0) {
             value = field.disabled;
-        } else if (field.when && std::find(field.when_is.begin(), field.when_is.end(),
-                                           field.when->raw(data)) == field.when_is.end()) {
+        } else if (!field.is_meant(data)) {
             value = field.otherwise;
         } else if (field.codec.validity(raw) != Validity::valid) {
             value = field.absent;

@@ -54,6 +54,18 @@ int own_signal(SignalTable& signals, const std::string& name, const std::string&
     return signals.add(signal);
 }
 
+// Of a message, as the mapping has it or else the DBC [ms]; 0: it has none.
+double cycle_ms(const Mapping& mapping, const dbc::Message& layout, const MessageMap& map) {
+    if (map.cycle_ms) return *map.cycle_ms;
+    const double cycle = layout.cycle_time_ms();
+    if (cycle != 0 && !(cycle >= kShortestPeriodMs && cycle <= kLongestPeriodMs))
+        fail(mapping, map.line, map.column,
+             "message " + map.name + ": GenMsgCycleTime = " + layout.attributes.at("GenMsgCycleTime") +
+                 " in " + mapping.database.file + "; " + within_words(kShortestPeriodMs, kLongestPeriodMs) +
+                 ", or be overruled by cycle_ms");
+    return cycle;
+}
+
 template <class Optional>
 double or_else(const Optional& value, double fallback) {
     return value ? *value : fallback;
@@ -229,9 +241,9 @@ void CanLink::Data::build_received(const Mapping& mapping, const dbc::Message& l
     message.length = static_cast<std::uint8_t>(layout.length);
     message.command = map.command;
     message.hold = map.hold_when_lost.value_or(map.command);
-    const double cycle_ms = or_else(map.cycle_ms, layout.cycle_time_ms());
-    message.timeout_ns = to_ns(or_else(map.timeout_ms, 5 * cycle_ms));
-    message.late_ns = to_ns(1.5 * cycle_ms);
+    const double cycle = cycle_ms(mapping, layout, map);
+    message.timeout_ns = to_ns(or_else(map.timeout_ms, 5 * cycle));
+    message.late_ns = to_ns(1.5 * cycle);
     if (map.command && message.timeout_ns == 0)
         fail(mapping, map.line, map.column, "message " + map.name + " is a command and needs a timeout_ms");
     message.counter = counter_field(layout, map);
@@ -260,7 +272,7 @@ void CanLink::Data::build_sent(const Mapping& mapping, const dbc::Message& layou
     if (mapping.is_j1939(layout)) message.frame.data.fill(0xFF);
     message.by_transport = layout.length > 8 && !message.frame.fd;
     if (message.by_transport) message.frame.length = static_cast<std::uint8_t>(layout.length);
-    message.cycle_ns = to_ns(or_else(map.cycle_ms, layout.cycle_time_ms()));
+    message.cycle_ns = to_ns(cycle_ms(mapping, layout, map));
     message.phase_ns = map.phase_ms ? to_ns(*map.phase_ms) : -1;
     if (message.cycle_ns == 0)
         warnings.push_back(mapping.file + ":" + std::to_string(map.line) + ": message " + map.name +
@@ -415,8 +427,8 @@ void CanLink::Data::build_troubles(const Mapping& mapping, const SignalTable& si
 void CanLink::Data::judge_load(const Mapping& mapping) {
     for (const auto& map : mapping.messages) {
         const dbc::Message& layout = *mapping.database.find(map.name);
-        const double cycle_ms = or_else(map.cycle_ms, layout.cycle_time_ms());
-        if (cycle_ms <= 0) continue;
+        const double cycle = cycle_ms(mapping, layout, map);
+        if (cycle <= 0) continue;
         double seconds =
             worst_case_classic_bits(layout.extended, std::min(layout.length, 8)) / mapping.bit_rate;
         if (layout.length > 8 && mapping.data_bit_rate <= 0)
@@ -428,7 +440,7 @@ void CanLink::Data::judge_load(const Mapping& mapping) {
             frame.length = fd_length(static_cast<unsigned>(layout.length));
             seconds = 1e-9 * static_cast<double>(duration_ns(frame, mapping.bit_rate, mapping.data_bit_rate));
         }
-        load += seconds / (1e-3 * cycle_ms);
+        load += seconds / (1e-3 * cycle);
     }
     // DM1 once a second of every node that may have troubles.
     std::vector<std::string> tellers;

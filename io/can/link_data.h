@@ -1,6 +1,7 @@
 // What CanLink is made of: descriptors compiled from the mapping (link_build.cpp) and run by link.cpp.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
@@ -41,6 +42,11 @@ struct Field {
     std::optional<SignalCodec> when;
     std::vector<std::uint64_t> when_is;
     double otherwise = 0, absent = 0;  // table values: condition not met; not available or lost
+
+    // Is the condition `when` met, if there is one? Otherwise nobody reads the field, whatever stands in it.
+    bool is_meant(const std::uint8_t* data) const SHIFTRIG_REALTIME {
+        return !when || std::find(when_is.begin(), when_is.end(), when->raw(data)) != when_is.end();
+    }
 
     // sending
     double travelled = 0;  // physical · gain

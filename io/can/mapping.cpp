@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <initializer_list>
+#include <iomanip>
 #include <sstream>
 #include <utility>
 
@@ -26,19 +28,19 @@ class Reader {
         keys(node, "the mapping",
              {"dbc", "bit_rate", "data_bit_rate", "protocol", "rig_nodes", "lockstep", "name", "messages",
               "trouble_codes"});
-        const std::string dbc = need(node, "dbc").as<std::string>();
+        const std::string dbc = text(need(node, "dbc"));
         result.database = dbc::read((std::filesystem::path(file_).parent_path() / dbc).string());
-        if (node["bit_rate"]) result.bit_rate = positive(node["bit_rate"], "bit_rate");
-        if (node["data_bit_rate"]) result.data_bit_rate = positive(node["data_bit_rate"], "data_bit_rate");
+        if (node["bit_rate"]) result.bit_rate = bit_rate(node["bit_rate"], "bit_rate");
+        if (node["data_bit_rate"]) result.data_bit_rate = bit_rate(node["data_bit_rate"], "data_bit_rate");
         if (node["protocol"])
             result.j1939 = one_of<bool>(node["protocol"], "protocol", {{"j1939", true}, {"plain", false}});
-        for (const auto& name : need(node, "rig_nodes")) {
+        for (const auto& name : list(need(node, "rig_nodes"), "rig_nodes")) {
             const auto& nodes = result.database.nodes;
             result.rig_nodes.push_back(text(name));
             if (std::none_of(nodes.begin(), nodes.end(), [&](const auto& n) { return n.name == text(name); }))
                 fail(name, "rig_nodes: " + result.database.file + " has no node \"" + text(name) + "\"");
         }
-        for (const auto& entry : need(node, "messages"))
+        for (const auto& entry : map(need(node, "messages"), "messages"))
             result.messages.push_back(message(entry.first, entry.second, result.database));
         if (const YAML::Node lockstep = node["lockstep"]) {
             keys(lockstep, "lockstep", {"question", "answer"});
@@ -52,7 +54,8 @@ class Reader {
             if (name["identity"])
                 result.identity = static_cast<std::uint32_t>(integer(name["identity"], 0, 0x1FFFFF));
         }
-        for (const auto& entry : node["trouble_codes"]) troubles(entry, result);
+        if (node["trouble_codes"])
+            for (const auto& entry : list(node["trouble_codes"], "trouble_codes")) troubles(entry, result);
         return result;
     }
 
@@ -80,13 +83,15 @@ class Reader {
              {"command", "cycle_ms", "timeout_ms", "phase_ms", "pin", "when_lost", "counter", "checksum",
               "signals"});
         if (node["command"]) result.command = boolean(node["command"]);
-        if (node["cycle_ms"]) result.cycle_ms = positive(node["cycle_ms"], "cycle_ms");
-        if (node["timeout_ms"]) result.timeout_ms = positive(node["timeout_ms"], "timeout_ms");
-        if (node["phase_ms"]) result.phase_ms = number(node["phase_ms"]);
-        for (const auto& pin : node["pin"]) {
-            if (text(pin) != "source" && text(pin) != "priority")
-                fail(pin, "pin: must be source or priority");
-            (text(pin) == "source" ? result.pin_source : result.pin_priority) = true;
+        if (node["cycle_ms"]) result.cycle_ms = period(node["cycle_ms"], "cycle_ms");
+        if (node["timeout_ms"]) result.timeout_ms = period(node["timeout_ms"], "timeout_ms");
+        if (node["phase_ms"]) result.phase_ms = within(node["phase_ms"], "phase_ms", 0, kLongestPeriodMs);
+        if (node["pin"]) {
+            for (const auto& pin : list(node["pin"], "pin")) {
+                if (text(pin) != "source" && text(pin) != "priority")
+                    fail(pin, "pin: must be source or priority");
+                (text(pin) == "source" ? result.pin_source : result.pin_priority) = true;
+            }
         }
         if (node["when_lost"])
             result.hold_when_lost =
@@ -113,8 +118,9 @@ class Reader {
                 fail(checksum,
                      "checksum of " + result.name + ": tsc1 wants a counter and a message of 8 bytes");
         }
-        for (const auto& entry : node["signals"])
-            result.signals.push_back(signal(entry.first, entry.second, *layout));
+        if (node["signals"])
+            for (const auto& entry : map(node["signals"], "signals of " + result.name))
+                result.signals.push_back(signal(entry.first, entry.second, *layout));
         return result;
     }
 
@@ -171,6 +177,8 @@ class Reader {
             const YAML::detail::iterator_value entry =
                 *when.begin();  // the iterator's arrow yields a temporary
             result.when = layout_signal(entry.first, layout);
+            if (!entry.second.IsSequence() || entry.second.size() == 0)
+                fail(when, label + ": when must be {SIGNAL: [raw values]}");
             for (const auto& value : entry.second) result.when_is.push_back(integer(value, 0, INT64_MAX));
             result.otherwise = number(need(node, "otherwise"));
         }
@@ -192,7 +200,7 @@ class Reader {
                                          {"amber", j1939::Lamp::amber},
                                          {"red", j1939::Lamp::red},
                                          {"malfunction", j1939::Lamp::malfunction}});
-        if (node["after_ms"]) code.after_ms = positive(node["after_ms"], "after_ms");
+        if (node["after_ms"]) code.after_ms = period(node["after_ms"], "after_ms");
         if (!need(node, "fmi").IsMap()) fail(node["fmi"], "fmi: {5: sensor.output.dropout, …} is wanted");
         for (const auto& entry : node["fmi"]) {
             code.fmi = static_cast<unsigned>(integer(entry.first, 0, 31));
@@ -240,13 +248,22 @@ class Reader {
         const auto [rest, error] = std::from_chars(written.data(), written.data() + written.size(), value);
         const auto unit =
             unit_conversion({rest, static_cast<std::size_t>(written.data() + written.size() - rest)});
-        if (error != std::errc{} || !unit)
+        if (error != std::errc{} || !unit || !std::isfinite(value))
             fail(node, "\"" + written + "\" is not a number with a unit, such as 1201 Nm");
         return {value * unit->factor + unit->offset, unit->unit};
     }
 
     // ---- YAML ------------------------------------------------------------------------------------------
 
+    // What is written as something else would look like an empty one. A key without a value is one.
+    YAML::Node map(const YAML::Node& node, const std::string& what) const {
+        if (!node.IsMap() && !node.IsNull()) fail(node, what + ": keys and values are wanted");
+        return node;
+    }
+    YAML::Node list(const YAML::Node& node, const std::string& what) const {
+        if (!node.IsSequence() && !node.IsNull()) fail(node, what + ": a list is wanted, such as [a, b]");
+        return node;
+    }
     void keys(const YAML::Node& node, const std::string& what,
               std::initializer_list<std::string_view> known) const {
         if (!node.IsMap()) fail(node, what + ": keys and values are wanted");
@@ -271,7 +288,11 @@ class Reader {
         if (error != std::errc{} || rest != end) fail(node, "\"" + written + "\" is not " + wanted);
         return value;
     }
-    double number(const YAML::Node& node) const { return parsed<double>(node, "a number"); }
+    double number(const YAML::Node& node) const {
+        const auto value = parsed<double>(node, "a number");
+        if (!std::isfinite(value)) fail(node, "\"" + text(node) + "\" must be a finite number");
+        return value;
+    }
     std::int64_t integer(const YAML::Node& node, std::int64_t smallest, std::int64_t largest) const {
         const auto value = parsed<std::int64_t>(node, "an integer");
         if (value < smallest || value > largest)
@@ -279,10 +300,17 @@ class Reader {
                            std::to_string(largest));
         return value;
     }
-    double positive(const YAML::Node& node, const std::string& key) const {
-        const double value = number(node);
-        if (!(value > 0)) fail(node, key + " = " + text(node) + "; must be > 0");
+    double within(const YAML::Node& node, const std::string& key, double smallest, double largest) const {
+        const auto value = parsed<double>(node, "a number");
+        if (!(value >= smallest && value <= largest))
+            fail(node, key + " = " + text(node) + "; " + within_words(smallest, largest));
         return value;
+    }
+    double period(const YAML::Node& node, const std::string& key) const {
+        return within(node, key, kShortestPeriodMs, kLongestPeriodMs);
+    }
+    double bit_rate(const YAML::Node& node, const std::string& key) const {
+        return within(node, key, 1e3, 1e9);
     }
     bool boolean(const YAML::Node& node) const {
         return one_of<bool>(node, "command", {{"true", true}, {"false", false}});
@@ -302,6 +330,12 @@ class Reader {
 };
 
 }  // namespace
+
+std::string within_words(double smallest, double largest) {
+    std::ostringstream words;
+    words << std::setprecision(12) << "must be within " << smallest << " and " << largest;
+    return words.str();
+}
 
 const MessageMap* Mapping::find(std::string_view message) const noexcept {
     const auto found = std::find_if(messages.begin(), messages.end(),

@@ -27,6 +27,11 @@ enum class Use : std::uint8_t {
     constant,    // a fixed number in the DBC signal's unit; nothing in the table
 };
 
+// Of cycles, timeouts and the like [ms]: from a microsecond to a day.
+inline constexpr double kShortestPeriodMs = 1e-3, kLongestPeriodMs = 86'400'000;
+// "must be within 0.001 and 86400000"
+std::string within_words(double smallest, double largest);
+
 // A number with its unit, as in `per: 1201 Nm`.
 struct Quantity {
     double value = 1;  // in `unit`

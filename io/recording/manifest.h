@@ -33,7 +33,7 @@ struct Manifest {
     int substeps = 1;                  // plant steps per tick
     std::int64_t tick_ns = 1'000'000;  // period of a tick [ns] = substeps · step_size
     std::string kernel;                // plant::Model::kernel()
-    std::uint64_t seed = 0;            // of everything random
+    std::uint64_t seed = 1;            // plant::Model::seed()
     std::int64_t first_tick = 0;       // number of the first tick; > 0 if the run continued a snapshot
     bool wall_clock = false;           // record_timing_t are kept
     std::int64_t start_utime = 0;      // wall clock at the start [µs since 1970]; 0: begin() takes it

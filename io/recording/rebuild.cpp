@@ -38,6 +38,7 @@ plant::Model build_as_recorded(ModelFile& file, const Manifest& manifest) {
     plant::BuildOptions options;
     options.step_size = manifest.step_size;
     options.kernel = kernel_of(manifest.kernel);
+    options.seed = manifest.seed;
     return build_model(file, options);
 }
 

@@ -32,6 +32,12 @@ double current_for(const Solenoid& solenoid, double pressure) {
     return interpolate(inverse, pressure);
 }
 
+// A service brake; nullptr: the driver's pedal does not apply this clutch.
+const ActuationApply* by_pedal(const Clutch& clutch) {
+    const auto* apply = std::get_if<ActuationApply>(&clutch.actuation);
+    return apply && apply->by_driver_brake ? apply : nullptr;
+}
+
 }  // namespace
 
 void check_parameters(const Check& check, const Clutch& c) {
@@ -87,6 +93,11 @@ void check_parameters(const Check& check, const Clutch& c) {
         check.not_negative("stroke", h->stroke);
         check.not_negative("fill_volume", h->fill_volume);
         if (h->fill_volume > 0) check.positive("fill_flow", h->fill_flow);
+        // A spring that weakens along the stroke has no stroke that balances a pressure.
+        const auto* wet = std::get_if<WetPlates>(&c.friction);
+        if (wet && has_piston(*h) && !(h->preload_pressure <= wet->return_pressure))
+            check.fail("preload_pressure",
+                       "= " + number(h->preload_pressure) + "; must be <= return_pressure");
         if (h->solenoid) {
             check.rising("solenoid", h->solenoid->pressure_over_current);
             check.not_negative("hysteresis", h->solenoid->hysteresis);
@@ -112,6 +123,15 @@ void check_surroundings(const Description& machine, const Clutch& c) {
     const bool needs_oil = c.drag || c.heat;
     if (needs_oil && !machine.oil)
         Check("clutch", c.name).fail(c.drag ? "drag" : "heat", "needs the model's oil");
+    const auto* pedal = by_pedal(c);
+    if (!pedal) return;
+    for (const Clutch& other : machine.clutches) {
+        const auto* same = by_pedal(other);
+        if (same && same->initial != pedal->initial && &other < &c)
+            Check("clutch", c.name)
+                .fail("initial", "= " + number(pedal->initial) + "; must be that of \"" + other.name +
+                                     "\", which the same pedal applies");
+    }
 }
 
 void assemble(Assembly& assembly, const Clutch& c) {

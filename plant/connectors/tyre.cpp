@@ -43,7 +43,8 @@ void add_law(detail::ModelBuilder& builder, const BrixiusTyre& t) {
     law.wheel_force = builder.external(law.wheel);
     law.body_force = builder.external(law.body);
     law.mobility = builder.input("environment.mobility_number", Unit::one, t.mobility_number, 1, 1e4,
-                                 "Brixius number of the soil");
+                                 "Brixius number of the soil under the first tyre; others in proportion");
+    law.share = t.mobility_number / m.description.tyres.front().mobility_number;
     law.resistance = builder.pair(t.body + ".resistance");
     m.tyres.push_back(law);
     m.auxiliary += 1;  // its relaxed slip

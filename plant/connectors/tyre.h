@@ -12,12 +12,15 @@ namespace shiftrig::plant {
 // Tyre with Brixius traction and relaxation, between a wheel and a translating mass.
 struct BrixiusTyre {
     std::string name, wheel, body;
-    double radius = 0;               // rolling radius [m]
-    double mobility_number = 0;      // Bn [1]; initial value of input `environment.mobility_number`
+    double radius = 0;  // rolling radius [m]
+    double mobility_number =
+        0;  // Bn [1]; of the first tyre: initial value of input `environment.mobility_number`
     double relaxation_length = 0;    // σ [m]
     double slip_damping_time = 0;    // τ [s]
     double weight = 0;               // on this contact [N]
     double rolling_coefficient = 0;  // 0.04: rolling moment coeff·W·r as a friction device on the wheel
+    // Bn is the soil's strength times what is the tyre's own (width, diameter, weight). The input changes the soil, and with it the
+    // numbers of all tyres in proportion.
     // The rest of the motion resistance acts on the body as a friction device (1/Bn + 0.5|s|/√Bn)·W.
 };
 

@@ -7,8 +7,8 @@
 //   T_p   torque passed from the pump mass into the converter     Nm
 //   T_t   torque passed from the converter to the turbine mass    Nm
 //   ν     speed ratio slow over fast, limited to ≥ 0              1
-//   K     capacity factor ω_p/√T_p of the pump                    rad/s/√Nm
-//   R     torque ratio                                            1
+//   K     capacity factor ω_p/√T_p of the pump                    rad/s/√Nm, > 0
+//   R     torque ratio                                            1, ≥ 0; R(ν) ν ≤ 1, else it made power
 //
 // g carries the torque through zero at synchronous speed: published K tables end there with a finite
 // value, which as it stands would jump in sign.

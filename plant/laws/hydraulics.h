@@ -4,7 +4,7 @@
 //     dead time   u_d(t) = u(t − d): commands are held over steps, so u_d changes at most once inside a step
 //     slew        ṙ = ± slew towards u_d
 //     valve       p̈ = ω² (r − p) − 2 ζ ω ṗ
-//     spring      p_s(x) = preload + (p_return − preload) x/stroke
+//     spring      p_s(x) = preload + (p_return − preload) x/stroke, preload ≤ p_return
 //     piston      x follows x_eq (where p_s(x_eq) = p, within 0…stroke) at no more than ± stroke · Q/V
 //     chamber     p_c = p where x = x_eq, p_s(x) while x moves
 //

@@ -1,7 +1,7 @@
 // Transmission oil: viscosity, what cold oil does to valves, and the drag of an open wet clutch.
 //
 //     η = η_0 · e^(−decay·T)
-//     cold share c = (ln η − ln η_warm)/(ln η_cold − ln η_warm), within 0…1; linear in T
+//     cold share c = (ln η − ln η_warm)/(ln η_cold − ln η_warm), within 0…1; linear in T, warm above cold
 //     dead time factor 1 + (cold_dead_time_factor − 1) c
 //     valve frequency factor 1 + (cold_valve_frequency_factor − 1) c
 //     fill flow factor 1/(1 + η/η_fill)

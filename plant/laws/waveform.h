@@ -4,8 +4,9 @@
 //
 // A piece is active on [from, until); its left limit is taken on (from, until]. Times within rounding of an edge count as the
 // edge, since n·h need not meet a decimal number exactly. No more than that: what follows an edge may be over sooner than
-// one thinks, and its end must not be taken for the time before the edge. Inside a step, parts of it end at edges.
+// one thinks, and its end must not be taken for the time before the edge.
 // An open start (from = −1e300) has its slope reckoned from t = 0.
+// Edges are breakpoints of the machine (ModelBuilder::breakpoints): no part of a step reaches across one, wherever it lies.
 #pragma once
 
 #include "plant/description.h"

@@ -244,6 +244,51 @@ TEST(Rig, PedalReleasesTheMainClutchWhateverTheControllerSays) {
     EXPECT_NE(column(result.run, "clutch.Fc.state").back(), 0);
 }
 
+// A noisy sensor, then two seconds of it.
+std::vector<double> noisy_readings(const std::string& seed) {
+    Rig rig(make_setup(
+        {}, inline_scenario("duration_s: 2\n" + seed + "start: {inputs: {sensor.engine.noise_rpm: 20}}\n")));
+    const int reading = rig.signals().find("sensor.engine.speed");
+    std::vector<double> readings;
+    while (rig.ticks() < 200) {
+        rig.tick();
+        readings.push_back(rig.value(reading));
+    }
+    return readings;
+}
+
+TEST(Rig, ScenariosSeedIsThatOfTheNoise) {
+    const auto unsaid = noisy_readings(""), one = noisy_readings("seed: 1\n"),
+               two = noisy_readings("seed: 2\n");
+    EXPECT_EQ(unsaid, one);
+    EXPECT_EQ(two, noisy_readings("seed: 2\n"));
+    int same = 0;
+    for (std::size_t i = 0; i < one.size(); ++i) same += one[i] == two[i];
+    EXPECT_EQ(same, 0);
+}
+
+// Every other command lost, which ones is the seed's to say.
+std::vector<double> luck_of_commands(const std::string& seed, const std::string& own) {
+    Rig rig(make_setup(
+        {}, inline_scenario("duration_s: 1\n" + seed + "bus_faults: {" + own +
+                            "faults: [{fault: drop, message: ClutchCommandA, probability: 0.5}]}\n")));
+    const int status = rig.signals().find("bus.ClutchCommandA.status");
+    std::vector<double> statuses;
+    while (rig.ticks() < 1000) {
+        rig.tick();
+        statuses.push_back(rig.value(status));
+    }
+    return statuses;
+}
+
+TEST(Rig, ScenariosSeedIsThatOfBusFaultsWithoutTheirOwn) {
+    const auto unsaid = luck_of_commands("", ""), two = luck_of_commands("seed: 2\n", "");
+    EXPECT_EQ(unsaid, luck_of_commands("seed: 1\n", ""));
+    EXPECT_NE(unsaid, two);
+    EXPECT_EQ(unsaid, luck_of_commands("seed: 2\n", "seed: 1, "));
+    EXPECT_EQ(two, luck_of_commands("", "seed: 2, "));
+}
+
 TEST(Rig, CertificateOfARunKeepsTheWorstAndCountsTheTicksOfEachFlag) {
     RunCertificate run;
     plant::Certificate tick;
@@ -301,6 +346,35 @@ TEST(Rig, ScenarioThatSetsAnOutputIsRefusedWithItsPlace) {
             std::string(error.what()),
             config + "scenarios/inline.yaml:5:17: mass.vehicle.speed_kmh is an output; it cannot be set");
     }
+}
+
+TEST(Rig, BusFaultsThatNoBusCarriesAreRefusedWithTheirPlace) {
+    const auto refusal = [](const std::string& model, Choices choices) {
+        try {
+            Rig rig(make_setup(choices, io::parse_scenario("model: ../" + model +
+                                                               "\nduration_s: 1\n"
+                                                               "bus_faults:\n"
+                                                               "  - {fault: drop, message: ClutchCommandA}\n",
+                                                           config + "scenarios/inline.yaml")));
+            return std::string();
+        } catch (const io::InputError& error) {
+            return std::string(error.what());
+        }
+    };
+    const std::string place = config + "scenarios/inline.yaml:4:3: bus_faults: ";
+    const std::string no_bus =
+        "there is no CAN bus that they could act on; one of the buses must be inprocess, can:INTERFACE or "
+        "udpcan:GROUP:PORT";
+    Choices nobody, silent, lcm;
+    nobody.controller = silent.controller = lcm.controller = "none";
+    silent.buses = {"inprocess"};
+    lcm.buses = {"lcm:memq://"};
+    EXPECT_EQ(refusal("tractor.yaml", {}), "");
+    EXPECT_EQ(refusal("tractor.yaml", silent), "");
+    EXPECT_EQ(refusal("tractor.yaml", nobody), place + no_bus);
+    EXPECT_EQ(refusal("tractor.yaml", lcm), place + no_bus);
+    EXPECT_EQ(refusal("two_mass.yaml", {}),
+              place + config + "two_mass.yaml has no stanza `can:`, and so no bus that they could act on");
 }
 
 }  // namespace

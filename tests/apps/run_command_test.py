@@ -285,6 +285,28 @@ class Results(InAFolder):
         with open(trace) as file:
             self.assert_chrome_trace(json.load(file), ticks=6000)
 
+    def noisy(self, seed):
+        """A scenario in which a sensor is noisy; returns its path."""
+        path = self.path(f"noisy_{seed}.yaml")
+        with open(path, "w") as file:
+            file.write(f"model: {CONFIG}/tractor.yaml\nduration_s: 1\nseed: {seed}\n"
+                       "start: {inputs: {sensor.engine.noise_rpm: 20}}\n")
+        return path
+
+    def test_noise_is_replayed_and_gone_on_with_from_the_scenarios_seed(self):
+        recording, snapshot = self.path("noisy.lcmlog"), self.path("half.lcmlog")
+        noisy = self.noisy(7)
+        whole = free("--record", recording, "--snapshot-at", "0.5", snapshot, scenario=noisy)
+        with open(recording, "rb") as file:
+            self.assertIn(b'"seed": 7', file.read())
+        replayed = subprocess.run([SHIFTRIG, "replay", recording], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(replayed.returncode, 0, replayed.stderr + replayed.stdout)
+        done = run("--from", snapshot, "--duration", "1", "--pace", "free", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        reading = "sensor.engine.speed_rad_s"
+        self.assertEqual(json.loads(done.stdout.splitlines()[-1])["final"][reading], whole["final"][reading])
+        self.assertNotEqual(free(scenario=self.noisy(8))["final"][reading], whole["final"][reading])
+
     # The Trace Event Format as chrome://tracing and ui.perfetto.dev read it.
     def assert_chrome_trace(self, trace, ticks):
         events = trace["traceEvents"]
@@ -311,6 +333,11 @@ class Results(InAFolder):
         self.assertEqual([(s["from"], s["to"], s["completed"]) for s in second["shifts"]], [("F2", "F3", True)])
         for one, other in zip(first["shifts"], second["shifts"]):
             self.assertAlmostEqual(one["ended_s"], other["ended_s"], delta=0.02)
+
+    def test_a_log_that_does_not_fit_the_disk_fails_the_run(self):
+        done = run("--scenario", SHIFT, "--pace", "free", "--can-log", "/dev/full")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("/dev/full: cannot be written: No space left on device", done.stderr.splitlines())
 
     def test_sigint_ends_the_run_with_everything_recorded(self):
         recording = self.path("cut.lcmlog")

@@ -185,5 +185,21 @@ TEST_F(CandumpFile, AMissingOrUnwritableFileIsSaidInOneLine) {
     EXPECT_THROW(CandumpLogger(bus.end(0), "/nowhere/x.log"), InputError);
 }
 
+TEST_F(CandumpFile, ADiskThatIsFullIsToldWhenTheLogIsFinished) {
+    InProcessBus bus(2);
+    Frame frame;
+    frame.length = 8;
+    CandumpLogger logged(bus.end(0), "/dev/full"), other(bus.end(1), path_);
+    for (CandumpLogger* each : {&logged, &other}) {
+        each->send(0, frame);
+        each->finish();
+        each->finish();  // once is enough
+    }
+    EXPECT_EQ(logged.error(), "/dev/full: cannot be written: No space left on device");
+    EXPECT_EQ(logged.lost(), 0U);
+    EXPECT_EQ(other.error(), "");
+    EXPECT_EQ(read_candump(path_).size(), 1U);
+}
+
 }  // namespace
 }  // namespace shiftrig::io::can

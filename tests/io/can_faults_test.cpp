@@ -140,6 +140,20 @@ TEST(Faults, BusOffSilencesBothWaysAndIsSeenInTheState) {
     EXPECT_EQ(wire.faulty.counters().send_dropped, 10U);
 }
 
+// Number n is due at n + 7 ms; the bus is off from 10 to 20 ms, so numbers 3 to 12 meet it on their way, and it refuses 10 to 19.
+TEST(Faults, WhatIsUnderWayWhenTheBusGoesOffIsLostAndCounted) {
+    Wire wire("[{fault: delay, by_ms: 7}, {fault: bus_off, from_s: 0.010, until_s: 0.020}]");
+    wire.run(0, 40);
+    std::vector<std::pair<int, int>> expected;
+    for (int number = 0; number < 33; ++number)
+        if (number < 3 || number >= 20) expected.emplace_back(number, number + 7);
+    EXPECT_EQ(wire.received, expected);
+    EXPECT_EQ(wire.sent, expected);
+    const PortCounters counters = wire.faulty.counters();
+    EXPECT_EQ(counters.receive_dropped, 17U);  // 3 … 19
+    EXPECT_EQ(counters.send_dropped, 17U);
+}
+
 TEST(Faults, ABabblerTakesTheBusFromEverybodyElse) {
     InProcessBus bus(2, {.bit_rate = 250e3});
     FaultyPort faulty(bus.end(0), plan_of("[{fault: babble, rate_hz: 2500, id: 0x0}]"), mapping());

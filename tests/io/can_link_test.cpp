@@ -249,6 +249,46 @@ TEST(Trust, AnErrorOrNotAvailableInAnEnabledSlotIsNoCommandAndADisabledSlotIsZer
     EXPECT_EQ(rig.report().implausible, 1U);
 }
 
+// A field whose `when` is not met is nobody's business: torque of a TSC1 that asks for speed, and the other way round.
+TEST(Trust, AFieldThatIsNotMeantCannotMakeAMessageImplausible) {
+    TwoSides sides;
+    sides.run(0, 20, false);
+    unsigned counter = 0;
+    const auto send = [&](int ms, std::uint8_t mode, std::uint16_t raw_speed, std::uint8_t raw_torque) {
+        Frame frame;
+        frame.id = 0x0C000003;
+        frame.extended = true;
+        frame.length = 8;
+        const dbc::Message& layout = *sides.mapping.database.find("TSC1");
+        const auto put = [&](const char* signal, std::uint64_t raw) {
+            SignalCodec(*layout.find(signal), true).put(frame.data.data(), raw);
+        };
+        frame.data.fill(0xFF);
+        put("OverrideControlMode", mode);
+        put("RequestedSpeed", raw_speed);
+        put("RequestedTorque", raw_torque);
+        put("Counter", counter);
+        put("Checksum", tsc1_checksum(frame.id, frame.data.data(), counter));
+        counter = (counter + 1) % 8;
+        sides.bus.end(2).send(ms * kMs, frame);
+        sides.tick(ms * kMs, false);
+    };
+    const auto implausible = [&] {
+        for (const auto& report : sides.rig_link.report())
+            if (report.name == "TSC1") return report.implausible;
+        return std::uint64_t{99};
+    };
+    send(20, 1, 12000, 0);  // 1500 rpm; the torque byte, were it meant, is −125 %
+    EXPECT_EQ(sides.rig_value("engine.engine.speed_request_enable"), 1);
+    EXPECT_NEAR(sides.rig_value("engine.engine.speed_request"), 1500 * kRpm, 1e-9);
+    EXPECT_EQ(sides.rig_value("engine.engine.torque_limit"), 1);
+    EXPECT_EQ(implausible(), 0U);
+
+    send(30, 2, 12000, 0);  // here it is meant
+    EXPECT_EQ(implausible(), 1U);
+    EXPECT_EQ(sides.rig_value("engine.engine.speed_request_enable"), 1) << "the last one that was trusted";
+}
+
 TEST(Trust, SilenceEndsInLostWithinTheTimeoutAndFramesBringItBack) {
     TwoSides sides;
     value(sides.tcu, "clutch.F1.pressure_command") = 8e5;
@@ -461,7 +501,8 @@ TEST_F(Configuration, WhatIsWrongIsNamedWithItsPlace) {
               "small.yaml:4:3: small.dbc has no message \"Comand\"");
     EXPECT_EQ(error_of("  Command:\n    timeout: 3\n"),
               "small.yaml:5:5: message Command: unknown key \"timeout\"");
-    EXPECT_EQ(error_of("  Command:\n    timeout_ms: -3\n"), "small.yaml:5:17: timeout_ms = -3; must be > 0");
+    EXPECT_EQ(error_of("  Command:\n    timeout_ms: -3\n"),
+              "small.yaml:5:17: timeout_ms = -3; must be within 0.001 and 86400000");
     EXPECT_EQ(error_of("  Command:\n    signals:\n      Strange: mass.engine.speed\n"),
               "small.yaml:6:7: Command.Strange: unit \"furlong\" is not known");
     EXPECT_EQ(
@@ -470,6 +511,64 @@ TEST_F(Configuration, WhatIsWrongIsNamedWithItsPlace) {
     EXPECT_EQ(error_of("  Command:\n    checksum: {signal: Crc, formula: md5}\n"),
               "small.yaml:5:38: formula: \"md5\" is none of tsc1, xor8, sum8, crc8_j1850");
     EXPECT_EQ(error_of("  Command: [\n"), "small.yaml:5:1: end of sequence flow not found");
+}
+
+// What is written as another kind of thing would be read as nothing.
+TEST_F(Configuration, AListAMapAndAWordAreToldApart) {
+    EXPECT_EQ(error_of("  [Command]\n"), "small.yaml:4:3: messages: keys and values are wanted");
+    EXPECT_EQ(error_of("  Command: {signals: P}\n"),
+              "small.yaml:4:22: signals of Command: keys and values are wanted");
+    EXPECT_EQ(error_of("  Command: {signals: [P]}\n"),
+              "small.yaml:4:22: signals of Command: keys and values are wanted");
+    EXPECT_EQ(error_of("  Command: {pin: source}\n"),
+              "small.yaml:4:18: pin: a list is wanted, such as [a, b]");
+    EXPECT_EQ(
+        error_of("  Command: {signals: {P: {signal: clutch.F1.pressure_command, when: {Count: 1}, otherwise: "
+                 "0}}}\n"),
+        "small.yaml:4:69: Command.P: when must be {SIGNAL: [raw values]}");
+    EXPECT_EQ(
+        error_of(
+            "  Command: {signals: {P: {signal: clutch.F1.pressure_command, when: {Count: []}, otherwise: "
+            "0}}}\n"),
+        "small.yaml:4:69: Command.P: when must be {SIGNAL: [raw values]}");
+    EXPECT_EQ(error_of("  Command: {signals: {}}\ntrouble_codes: 5\n"),
+              "small.yaml:5:16: trouble_codes: a list is wanted, such as [a, b]");
+    EXPECT_EQ(error_of("  Command: {signals: }\n"), "accepted") << "nothing is an empty map";
+    const auto error_of_all = [&](const std::string& whole) {
+        try {
+            parse_mapping(YAML::Load(whole), (folder_ / "small.yaml").string());
+        } catch (const InputError& error) {
+            return std::string(error.what()).substr(folder_.string().size() + 1);
+        }
+        return std::string("accepted");
+    };
+    EXPECT_EQ(error_of_all("dbc: {a: 1}\n"), "small.yaml:1:6: a name is wanted");
+    EXPECT_EQ(error_of_all("dbc: small.dbc\nrig_nodes: Rig\nmessages: {}\n"),
+              "small.yaml:2:12: rig_nodes: a list is wanted, such as [a, b]");
+}
+
+TEST_F(Configuration, TimesAndRatesAreBounded) {
+    for (const char* wrong : {"inf", "1e300", "nan", "1e-7", "0", "86400001"})
+        EXPECT_EQ(
+            error_of(std::string("  Speeds: {cycle_ms: ") + wrong + "}\n"),
+            std::string("small.yaml:4:22: cycle_ms = ") + wrong + "; must be within 0.001 and 86400000");
+    EXPECT_EQ(error_of("  Speeds: {cycle_ms: 86400000}\n"), "accepted");
+    EXPECT_EQ(error_of("  Speeds: {cycle_ms: 1e400}\n"), "small.yaml:4:22: \"1e400\" is not a number");
+    EXPECT_EQ(error_of("  Speeds: {phase_ms: -1}\n"),
+              "small.yaml:4:22: phase_ms = -1; must be within 0 and 86400000");
+    EXPECT_EQ(error_of("  Speeds: {signals: {Engine: {constant: inf}}}\n"),
+              "small.yaml:4:41: \"inf\" must be a finite number");
+    EXPECT_EQ(error_of("  Speeds: {signals: {Engine: {signal: engine.engine.torque, per: inf Nm}}}\n"),
+              "small.yaml:4:66: \"inf Nm\" is not a number with a unit, such as 1201 Nm");
+    EXPECT_EQ(error_of("  Speeds: {}\nbit_rate: inf\n"),
+              "small.yaml:5:11: bit_rate = inf; must be within 1000 and 1000000000");
+
+    std::ofstream(folder_ / "small.dbc", std::ios::app) << "BA_ \"GenMsgCycleTime\" BO_ 257 1e300;\n";
+    EXPECT_EQ(
+        error_of("  Speeds: {}\n"),
+        "small.yaml:4:3: message Speeds: GenMsgCycleTime = 1e+300 in small.dbc; must be within 0.001 and "
+        "86400000, or be overruled by cycle_ms");
+    EXPECT_EQ(error_of("  Speeds: {cycle_ms: 10}\n"), "accepted");
 }
 
 TEST_F(Configuration, AWrongTroubleCodeIsNamedWithItsPlace) {

@@ -260,6 +260,9 @@ TEST(ModelFile, AMisspeltMassIsNamedWithItsNeighbour) {
 TEST(ModelFile, WhatThePlantRefusesIsShownAsWritten) {
     EXPECT_EQ(refusal(two_masses + replaced(wet_clutch, "inner_radius_m: 0.085", "inner_radius_m: 0.2")),
               "m.yaml:12:7: clutch \"F2\": wet_plates.inner_radius_m = 0.2; must be < outer_radius");
+    EXPECT_EQ(
+        refusal(two_masses + replaced(wet_clutch, "preload_pressure_bar: 0.8", "preload_pressure_bar: 5")),
+        "m.yaml:26:7: clutch \"F2\": hydraulic.preload_pressure_bar = 5; must be <= return_pressure");
     const std::string engine =
         "engines:\n"
         "  e: {mass: left, full_load_rpm_nm: [[700, 550], [2154, 729]], governor_slope_nm_s_per_rad: 187,\n"
@@ -272,6 +275,37 @@ TEST(ModelFile, WhatThePlantRefusesIsShownAsWritten) {
               "m.yaml:7:7: engine \"e\": cylinders = 0; must be at least 1");
     EXPECT_EQ(refusal(two_masses + replaced(engine, "[2154, 729]", "[700, 729]")),
               "m.yaml:6:50: engine \"e\": full_load_rpm_nm = [700, 729]; x must rise from pair to pair");
+}
+
+TEST(ModelFile, OilIsWarmAboveItsColdTemperature) {
+    const std::string oil =
+        "oil: {viscosity_at_zero_pa_s: 0.5, viscosity_decay_per_degc: 0.0414, initial_temperature_degc: 90,\n"
+        "      drag_speed_limit_rad_s: 60, cold_temperature_degc: -10, warm_temperature_degc: 90,\n"
+        "      cold_dead_time_factor: 4, cold_valve_frequency_factor: 0.4, fill_viscosity_pa_s: 0.1,\n"
+        "      pump_flow_l_per_min: 60}\n";
+    EXPECT_EQ(refusal(two_masses + oil), "");
+    EXPECT_EQ(refusal(two_masses + replaced(oil, "warm_temperature_degc: 90", "warm_temperature_degc: -10")),
+              "m.yaml:6:63: oil.warm_temperature_degc = -10; must be > cold_temperature");
+}
+
+TEST(ModelFile, APointOfATableIsNamedWithItsOwnPlace) {
+    const std::string converter =
+        "converters:\n"
+        "  c:\n"
+        "    pump: left\n"
+        "    turbine: right\n"
+        "    k_over_speed_ratio_rad_s_per_sqrt_nm: [[0, 6.6], [1, 12.4]]\n"  // 9
+        "    torque_ratio_over_speed_ratio: [[0, 2], [1, 1]]\n";             // 10
+    EXPECT_EQ(refusal(two_masses + replaced(converter, "[1, 12.4]", "[1, 0]")),
+              "m.yaml:9:54: converter \"c\": k_over_speed_ratio_rad_s_per_sqrt_nm = [1, 0]; y must be > 0");
+    EXPECT_EQ(refusal(two_masses + replaced(converter, "[1, 12.4]", "[1.5, 12.4]")),
+              "m.yaml:9:54: converter \"c\": k_over_speed_ratio_rad_s_per_sqrt_nm = [1.5, 12.4]; x must be "
+              "within 0 and 1");
+    EXPECT_EQ(refusal(two_masses + replaced(converter, "[1, 1]", "[1, -1]")),
+              "m.yaml:10:45: converter \"c\": torque_ratio_over_speed_ratio = [1, -1]; y must be at least 0");
+    EXPECT_EQ(refusal(two_masses + replaced(converter, "[1, 1]", "[1, 1.1]")),
+              "m.yaml:10:5: converter \"c\": torque_ratio_over_speed_ratio is 1.1 at speed ratio 1, more "
+              "power than goes in; their product must be <= 1");
 }
 
 TEST(ModelFile, GearPathsAndSafeCommandsNameClutchesThereAre) {

@@ -130,6 +130,10 @@ TEST(ScenarioFile, WhatIsWrongIsNamedWithItsPlace) {
     EXPECT_EQ(refusal("model: ../tractor.yaml\n"), "config/scenarios/s.yaml:1:1: duration_s is missing");
     EXPECT_EQ(refusal(head + "timline: []\n"),
               "config/scenarios/s.yaml:3:1: timline is not a known key; nearest: timeline");
+    EXPECT_EQ(refusal(head + "bus: {bit_rate: 250000}\n"),
+              "config/scenarios/s.yaml:3:1: bus is not a known key; the bit rate of the in-process bus "
+              "stands under "
+              "bus_faults (bit_rate)");
     EXPECT_EQ(refusal(head + "timeline:\n  - {driver.lever: 3}\n"),
               "config/scenarios/s.yaml:4:5: timeline.at_s is missing");
     EXPECT_EQ(refusal(head + "timeline:\n  - {at_s: 2, throttle: 3}\n"),

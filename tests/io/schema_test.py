@@ -43,10 +43,11 @@ for path in scenarios:
     accept(scenario, path)
 
 tractor = load(os.path.join(config, "tractor.yaml"))
+converter = load(os.path.join(config, "converter_tractor.yaml"))
 
 
-def refuse(what, change):
-    changed = copy.deepcopy(tractor)
+def refuse(what, change, machine=tractor):
+    changed = copy.deepcopy(machine)
     change(changed)
     if model.is_valid(changed):
         failures.append(f"the schema accepts {what}")
@@ -60,6 +61,13 @@ refuse("a clutch without a friction law", lambda m: m["clutches"]["Fc"].pop("dry
 refuse("two actuations", lambda m: m["clutches"]["Fc"].update(constant={}))
 refuse("a ratio of 0", lambda m: m["gears"]["PR"].update(ratio=0))
 refuse("an unknown section", lambda m: m.update(cluches={}))
+refuse("plates without a hole", lambda m: m["clutches"]["F1"]["wet_plates"].update(inner_radius_m=0))
+refuse("a plough without draft", lambda m: m["ploughs"]["plough"].update(a=0))
+refuse("an engine without torque before its boost", lambda m: m["engines"]["engine"].update(turbo_instant_fraction=0))
+refuse("a converter whose pump takes endless torque",
+       lambda m: m["converters"]["converter"].update(k_over_speed_ratio_rad_s_per_sqrt_nm=[[0, 6.6], [1, 0]]), converter)
+refuse("a speed ratio beyond 1",
+       lambda m: m["converters"]["converter"].update(torque_ratio_over_speed_ratio=[[0, 2.5], [1.5, 0]]), converter)
 
 print("\n".join(failures) or f"{len(models)} models, {len(scenarios)} scenarios")
 sys.exit(1 if failures else 0)

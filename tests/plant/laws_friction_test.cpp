@@ -11,6 +11,7 @@
 #include "plant/laws/tyre.h"
 #include "plant/laws/waveform.h"
 #include "plant/laws/wheel_contact.h"
+#include "plant/plant.h"
 #include "tests/plant/parts.h"
 
 namespace shiftrig::plant {
@@ -194,6 +195,66 @@ TEST(Waveform, IsOneSidedAtItsEdges) {
     EXPECT_NEAR(waveform(wave, 0.9, Side::left) - waveform(wave, 0.9, Side::right), 6, 1e-12);
     // 3·0.3 is not the double 0.9: the edge is met all the same.
     EXPECT_EQ(waveform(wave, 3 * 0.3, Side::right), waveform(wave, 0.9, Side::right));
+}
+
+// Carts that a wheel each drives, on tyres with these mobility numbers; the soil changes after a second, if at all. Slips after two.
+std::vector<double> slips(const std::vector<double>& mobility_numbers, double soil = 0) {
+    Description d;
+    for (std::size_t i = 0; i < mobility_numbers.size(); ++i) {
+        const std::string number = std::to_string(i);
+        d.masses.push_back(mass("wheel" + number, 50));
+        d.masses.push_back({"body" + number, 14000, Motion::translating, 0});
+        BrixiusTyre tyre = reference_tyre();
+        tyre.name = number, tyre.wheel = "wheel" + number, tyre.body = "body" + number;
+        tyre.mobility_number = mobility_numbers[i];
+        d.tyres.push_back(tyre);
+        d.sources.push_back(source("wheel" + number, constant(30000)));
+    }
+    const Model model = Model::build(d, {.step_size = 1e-3});
+    Operators operators(model);
+    State state(model);
+    Scratch scratch(model);
+    Inputs inputs(model);
+    Outputs outputs(model);
+    while (state.steps() < 2000) {
+        if (state.steps() == 1000 && soil > 0)
+            inputs.value[static_cast<std::size_t>(model.input("environment.mobility_number"))] = soil;
+        step(model, operators, state, inputs, outputs, scratch);
+    }
+    std::vector<double> result;
+    for (const BrixiusTyre& tyre : d.tyres)
+        result.push_back(
+            outputs.value[static_cast<std::size_t>(model.output("tyre." + tyre.name + ".slip"))]);
+    return result;
+}
+
+TEST(TyreInAMachine, EachHasItsOwnMobilityNumberAndTheSoilChangesAllInProportion) {
+    const auto both = slips({55, 20}), turned = slips({20, 55});
+    EXPECT_NEAR(both[0], slips({55})[0], 1e-12);
+    EXPECT_NEAR(both[1], slips({20})[0], 1e-12);
+    EXPECT_NEAR(turned[0], both[1], 1e-12);
+    EXPECT_NEAR(turned[1], both[0], 1e-12);
+    EXPECT_GT(both[1], 1.05 * both[0]) << "softer soil, more slip";
+
+    const auto softer = slips({55, 20}, 44);
+    EXPECT_NEAR(softer[0], slips({55}, 44)[0], 1e-12);
+    EXPECT_NEAR(softer[1], slips({20}, 16)[0], 1e-12);
+}
+
+TEST(WaveformInAMachine, AnEdgeInsideAStepActsFromItsOwnTimeOn) {
+    Description d;
+    d.masses = {mass("m", 2)};
+    d.sources = {source("m", constant(8, 0.00037, 0.00282))};
+    const Model model = Model::build(d, {.step_size = 1e-3});
+    Operators operators(model);
+    State state(model);
+    Scratch scratch(model);
+    Inputs inputs(model);
+    Outputs outputs(model);
+    for (const double expected : {4 * 0.63e-3, 4 * 1.63e-3, 4 * 2.45e-3}) {
+        step(model, operators, state, inputs, outputs, scratch);
+        EXPECT_NEAR(state.speeds()[0], expected, 1e-15);
+    }
 }
 
 }  // namespace

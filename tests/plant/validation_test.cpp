@@ -1,0 +1,136 @@
+// What the plant refuses to build: each refusal word for word, and the neighbour that it accepts.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "plant/plant.h"
+#include "tests/plant/machines.h"
+#include "tests/plant/parts.h"
+
+namespace shiftrig::plant {
+namespace {
+
+std::string refusal(const Description& d) {
+    try {
+        Model::build(d);
+        return "";
+    } catch (const ModelError& error) {
+        return error.what();
+    }
+}
+
+// ---- clutches ---------------------------------------------------------------------------------------
+
+Description wet_clutch(double preload, double stroke) {
+    ActuationHydraulic valve;
+    valve.natural_frequency = 60;
+    valve.damping_ratio = 0.8;
+    valve.slew = 150e5;
+    valve.maximum_pressure = 18e5;
+    valve.preload_pressure = preload;
+    valve.stroke = stroke;
+    valve.fill_volume = 30e-6;
+    valve.fill_flow = 20e-3 / 60;
+    Description d;
+    d.masses = {mass("left", 1), mass("right", 2)};
+    d.clutches = {clutch("F2", "left", "right", 1)};
+    d.clutches[0].friction = powershift_plates();
+    d.clutches[0].actuation = valve;
+    return d;
+}
+
+// A spring that weakens while it is pressed would throw the piston to full stroke, with no pressure to balance it on the way.
+TEST(Validation, TheReturnSpringOfAPistonDoesNotWeakenAlongItsStroke) {
+    EXPECT_EQ(refusal(wet_clutch(1.2e5, 2e-3)), "");
+    EXPECT_EQ(refusal(wet_clutch(5e5, 2e-3)),
+              "clutch \"F2\": preload_pressure = 500000; must be <= return_pressure");
+    EXPECT_EQ(refusal(wet_clutch(5e5, 0)), "") << "without a piston nobody asks for it";
+}
+
+TEST(Validation, OnePedalHasOnePosition) {
+    Description d;
+    d.masses = {mass("left", 1), mass("right", 2)};
+    d.clutches = {clutch("front", "left", "", 500, 1, ActuationApply{0.1, true, 0.25}),
+                  clutch("rear", "right", "", 900, 1, ActuationApply{0.1, true, 0.25}),
+                  clutch("parking", "right", "", 900, 1, ActuationApply{0.1, false, 1})};
+    EXPECT_EQ(refusal(d), "");
+    std::get<ActuationApply>(d.clutches[1].actuation).initial = 0;
+    EXPECT_EQ(refusal(d),
+              "clutch \"rear\": initial = 0; must be that of \"front\", which the same pedal applies");
+}
+
+// ---- oil --------------------------------------------------------------------------------------------
+
+std::string oil_refusal(double Oil::*field, double value) {
+    Description d;
+    d.masses = {mass("left", 1)};
+    d.oil = reference_oil();
+    (*d.oil).*field = value;
+    return refusal(d);
+}
+
+// Warm as cold would make the share of cold 0/0, and swapped ones would take the cold oil's valves for the warm ones.
+TEST(Validation, OilIsWarmAboveItsColdTemperature) {
+    EXPECT_EQ(oil_refusal(&Oil::warm_temperature, -9), "");
+    EXPECT_EQ(oil_refusal(&Oil::warm_temperature, -10),
+              "oil \"oil\": warm_temperature = -10; must be > cold_temperature");
+    EXPECT_EQ(oil_refusal(&Oil::cold_temperature, 91),
+              "oil \"oil\": warm_temperature = 90; must be > cold_temperature");
+}
+
+TEST(Validation, WhatOilDoesToValvesIsANumberAboveZero) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(oil_refusal(&Oil::cold_dead_time_factor, 0),
+              "oil \"oil\": cold_dead_time_factor = 0; must be > 0");
+    EXPECT_EQ(oil_refusal(&Oil::cold_valve_frequency_factor, -0.4),
+              "oil \"oil\": cold_valve_frequency_factor = -0.4; must be > 0");
+    EXPECT_EQ(oil_refusal(&Oil::fill_viscosity, 0), "oil \"oil\": fill_viscosity = 0; must be > 0");
+    EXPECT_EQ(oil_refusal(&Oil::initial_temperature, nan),
+              "oil \"oil\": initial_temperature = nan; must be finite");
+    EXPECT_EQ(oil_refusal(&Oil::cold_temperature, nan),
+              "oil \"oil\": cold_temperature = nan; must be finite");
+}
+
+// ---- converters -------------------------------------------------------------------------------------
+
+using Points = std::vector<std::pair<double, double>>;
+
+std::string converter_refusal(const Points& k, const Points& torque_ratio) {
+    Description d;
+    d.masses = {mass("engine", 1), mass("turbine", 2)};
+    d.converters = {{"c", "engine", "turbine", k, torque_ratio}};
+    return refusal(d);
+}
+
+TEST(Validation, AConverterTakesTorqueAtEverySpeedRatio) {
+    const Points torque_ratio = {{0, 2.5}, {0.85, 1}, {1, 1}};
+    EXPECT_EQ(converter_refusal({{0, 6.6}, {1, 12.4}}, torque_ratio), "");
+    EXPECT_EQ(converter_refusal({{0, 6.6}, {1, 0}}, torque_ratio),
+              "converter \"c\": k_over_speed_ratio is 0 at speed ratio 1; must be > 0");
+    EXPECT_EQ(converter_refusal({{0, -6.6}, {1, 12.4}}, torque_ratio),
+              "converter \"c\": k_over_speed_ratio is -6.6 at speed ratio 0; must be > 0");
+    EXPECT_EQ(converter_refusal({{0, 6.6}, {1.2, 12.4}}, torque_ratio),
+              "converter \"c\": k_over_speed_ratio has the speed ratio 1.2; must be within 0 and 1");
+    EXPECT_EQ(converter_refusal({{-0.5, 6.6}, {1, 12.4}}, torque_ratio),
+              "converter \"c\": k_over_speed_ratio has the speed ratio -0.5; must be within 0 and 1");
+}
+
+TEST(Validation, AConverterPassesNoMorePowerThanItTakes) {
+    const Points k = {{0, 6.6}, {1, 12.4}};
+    EXPECT_EQ(converter_refusal(k, {{0, 2}, {1, 1}}), "") << "ν (2 − ν) is 1 at the end";
+    EXPECT_EQ(converter_refusal(k, {{0, 2}, {1, -0.1}}),
+              "converter \"c\": torque_ratio_over_speed_ratio is -0.1 at speed ratio 1; must be >= 0");
+    EXPECT_EQ(
+        converter_refusal(k, {{0, 2}, {0.9, 1.2}}),
+        "converter \"c\": torque_ratio_over_speed_ratio is 1.2 at speed ratio 1, more power than goes in; "
+        "their product must be <= 1");
+    // Both ends pass nothing; between them ν (4 − 4 ν) rises to 1, ν (5 − 5 ν) to 1.25.
+    EXPECT_EQ(converter_refusal(k, {{0, 4}, {1, 0}}), "");
+    EXPECT_EQ(
+        converter_refusal(k, {{0, 5}, {1, 0}}),
+        "converter \"c\": torque_ratio_over_speed_ratio is 2.5 at speed ratio 0.5, more power than goes in; "
+        "their product must be <= 1");
+}
+
+}  // namespace
+}  // namespace shiftrig::plant
