@@ -97,7 +97,7 @@ struct Description {
     Method method = Method::automatic;
     int maximum_events = 4;  // K: located in one step, of its parts K each at most
     // A step is taken in up to this many parts where shafts swing or forces change too fast for one; 1: never.
-    // Both together bound the cost of a step, and are bounded for it. A backlash whose flanks are too stiff for that many raises both bounds, friction that rises
+    // Both together bound the cost of a step, and are bounded for it. A backlash whose flanks are too stiff for that many raises both bounds, friction that changes
     // too steeply over the slip the second, to 256 at most (not 1).
     int maximum_parts = 16;
     static constexpr int most_events = 64, most_parts = 256;

@@ -149,7 +149,7 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
         const double h = m.options.step_size;
         oldest->step = build_step_operators(m, *oldest, h, oldest->step_memory, scratch.workspace);
         const int halvings = oldest->step.halvings;
-        oldest->ledger_parts = halvings <= 1 ? 1 : 4 << std::min(halvings, 6);
+        oldest->ledger_parts = halvings == 0 ? 1 : halvings == 1 ? 4 : 4 << std::min(halvings, 6);
         if (oldest->ledger_parts > 1) {
             oldest->ledger = build_step_operators(m, *oldest, h / oldest->ledger_parts, oldest->ledger_memory,
                                                   scratch.workspace);

@@ -99,15 +99,17 @@ struct RootSearch {
 
 // Goes to where the margin vanishes on the interpolant of the part just computed, which is nearly as good as a step there,
 // and takes its slope.
-void look_ahead(Work& w, const Mode& mode, const Crossing& crossing, RootSearch& search) SHIFTRIG_REALTIME {
+template <typename Margin>
+void look_ahead(Work& w, const Mode& mode, RootSearch& search, double close_enough,
+                const Margin& margin) SHIFTRIG_REALTIME {
     constexpr int most_looks = 8;
-    const double from = search.low, length = search.high - search.low, close_enough = 1e-7 * search.size();
+    const double from = search.low, length = search.high - search.low;
     const Interpolant part = interpolate_part(w, mode);
     RootSearch looks = search;
     for (int k = 0; k < most_looks; ++k) {
         search.place = looks.place;
         sample_within(w, mode, part, (looks.place - from) / length, w.scratch.middle);
-        const double rest = crossing_margin(w, mode, crossing, w.scratch.middle);
+        const double rest = margin(w.scratch.middle);
         looks.tell(rest);
         if (std::fabs(rest) <= close_enough) break;
     }
@@ -127,7 +129,7 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
     const bool by_itself = acts_by_itself(crossing.change), overrun = crossing.change == Change::overrun;
     const double close_enough = (by_itself ? 1e-2 : overrun ? 1e-3 : 1e-6) * search.size();
     const double beyond = (by_itself ? 3e-3 : overrun ? 3e-4 : 0) * (until - done);
-    if (!mode.tree) look_ahead(w, mode, crossing, search);
+    if (!mode.tree) look_ahead(w, mode, search, 1e-7 * search.size(), left);
     search.place = std::min(search.place + beyond, until);
     for (int steps = 1;; ++steps) {
         const double reached = search.place;
@@ -144,15 +146,19 @@ double approach(Work& w, const Mode& mode, const Crossing& crossing, double done
 double approach_flank(Work& w, const Mode& mode, const Crossing& crossing, double done,
                       double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 12;
+    const Sample& begin = w.scratch.begin();
     Sample& end = w.scratch.end();
     const Flank flank = violated_flank(w, backlash_of(w, crossing.device), end);
-    const double size = margin_of(w, flank, w.scratch.begin()) - margin_of(w, flank, end);
+    const auto left = [&](const Sample& sample) { return margin_of(w, flank, sample); };
+    const double size = left(begin) - left(end);
     const double close_enough = std::max(1e-9 * size, flank_rounding(flank.law));
-    double low = done, high = until;
-    double reached = std::min(until, done + std::max(crossing.theta * (until - done), instant));
+    RootSearch search{done, until, left(begin), left(end),
+                      std::min(until, done + std::max(crossing.theta * (until - done), instant))};
+    look_ahead(w, mode, search, close_enough, left);
+    double low = done, high = until, reached = search.place;
     for (int steps = 1; steps < most_steps; ++steps) {
         integrate(w, mode, reached);
-        const double rest = margin_of(w, flank, end);
+        const double rest = left(end);
         if (rest <= 0 && rest >= -close_enough) return reached;
         (rest > 0 ? low : high) = reached;
         sample_rate(w, mode, end);

@@ -189,6 +189,25 @@ TEST(RandomSystems, LoopsAtRestLetGoTogether) {
         check(random_system_with_freewheels(seed, options.seconds), seed);
 }
 
+// A slip on a light mass, where friction falls by its slope within 25 µs, grows out of a torque that nobody sees.
+TEST(RandomSystems, SlipsThatGrowByThemselvesAreFollowedFromTheStart) {
+    const ComparisonOptions options;
+    for (const std::uint64_t seed : {51046u, 51095u}) {
+        const Comparison c =
+            compare(random_system_with_friction_tables(seed, options.seconds), seed, options);
+        EXPECT_EQ(name(c.outcome), std::string("agrees"))
+            << "seed " << seed << ": " << c.worst << " tolerances";
+    }
+}
+
+// Motion that dies out within a step or two: three points of a step show too little of its power.
+TEST(RandomSystems, TheLedgerClosesWhereMotionDiesOutWithinAStep) {
+    const ComparisonOptions options;
+    const Comparison c = compare(random_system(90747, options.seconds), 90747, options);
+    EXPECT_EQ(name(c.outcome), std::string("agrees"));
+    EXPECT_LT(c.energy_defect, 1e-4);
+}
+
 // Power that turns from no torque at all in the midst of a step: a clutch that begins to press along a sine.
 TEST(RandomSystems, PowerTurnsWhereAClutchBeginsToPress) {
     const ComparisonOptions options;
