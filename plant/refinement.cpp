@@ -42,21 +42,20 @@ bool takes_forces_amiss(const Work& w, const double* late, double reach, const C
 }
 
 // Friction that falls as the slip grows lets it grow by itself: what is amiss while it is small grows with it, however little
-// torque that is. Stages that miss more than this share of such a fall do not follow it.
+// torque that is. A last stage that misses more than this share of such a fall does not follow it.
 constexpr double growth_tolerance = 0.01, growing = 1.2;
 
-bool outgrows_stages(const Work& w, const double* late) {
+bool outgrows_stages(const Work& w) {
     const ModelData& m = w.model;
     if (!w.operators.table.fades && m.tabled_pairs.empty()) return false;
-    const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
+    const double *const begin = w.scratch.begin().slip, *const late = w.scratch.late.slip,
+                        *const end = w.scratch.end().slip;
     for (int k = 0; k < m.pairs; ++k) {
-        const double sense = slip_sign(w.contact[k]);
-        if (sense == 0 || !(std::fabs(end.slip[k]) > growing * std::fabs(begin.slip[k]))) continue;
-        // Of the factor: what presses the pair may change as well.
-        const double before = begin.load[k], after = end.load[k];
-        if (!(before > 0 && after > 0)) continue;
-        const double fall = std::max(before, after) * (begin.sliding[k] / before - end.sliding[k] / after);
-        if (fall > rounding * std::fabs(end.f[k]) && std::fabs(end.f[k] - late[k]) > growth_tolerance * fall)
+        if (!slips(w.contact[k]) || !(std::fabs(end[k]) > growing * std::fabs(begin[k]))) continue;
+        const FrictionLaw& law = m.pair_laws[static_cast<std::size_t>(k)].friction;
+        const double before = sliding_factor(law, begin[k]), after = sliding_factor(law, end[k]);
+        if (before - after > rounding * before &&
+            std::fabs(after - sliding_factor(law, late[k])) > growth_tolerance * (before - after))
             return true;
     }
     return false;
@@ -96,7 +95,7 @@ bool is_dense_coarse(Work& w, const Mode& mode) {
         }
         return moved;
     };
-    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || outgrows_stages(w, late.f) ||
+    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || outgrows_stages(w) ||
            hides_swing(w);
 }
 
@@ -129,7 +128,7 @@ bool is_tree_coarse(Work& w, const Mode& mode) {
         return m.kernel.loops.largest(of_mass, m.masses);
     };
     return swings_between(w, mode) || takes_forces_amiss(w, late, weight * t.liveliness, change) ||
-           outgrows_stages(w, late);
+           outgrows_stages(w);
 }
 
 }  // namespace
