@@ -29,7 +29,7 @@ class Brancher {
             throw io::InputError(
                 "the snapshot's controller was not the built-in one: its state is not in the snapshot");
         if (!setup_.buses.calibration_path.empty())
-            calibration_.emplace(io::read_text(setup_.buses.calibration_path), setup_.buses.calibration_path);
+            calibration_.emplace(setup_.buses.calibration_text, setup_.buses.calibration_path);
         for (const auto& v : plan.variations()) rebuilds_ = rebuilds_ || v.target == Variation::Target::model;
         if (rebuilds_) model_.emplace(snapshot.model_text, snapshot.model_path);
         for (const auto& v : plan.variations())

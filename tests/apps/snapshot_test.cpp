@@ -6,10 +6,12 @@
 #include <atomic>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 
 #include "apps/rig/fork.h"
 #include "io/recording/snapshot.h"
+#include "io/yaml_document.h"
 #include "recorded_rig.h"
 #include "tests/io/synthetic_recording.h"
 
@@ -23,8 +25,8 @@ bool is_bookkeeping(const std::string& name) {
 }
 
 // plough_upshift up to `at`, written as a snapshot.
-void write_snapshot_at(const std::string& path, double at) {
-    Rig rig(setup_for("plough_upshift"));
+void write_snapshot_at(const std::string& path, double at, const Setup& setup = setup_for("plough_upshift")) {
+    Rig rig(setup);
     SnapshotTaker taker(rig, at);
     rt::LoopSettings loop;
     loop.pace = rt::Pace::free;
@@ -119,6 +121,40 @@ INSTANTIATE_TEST_SUITE_P(Scenarios, EveryScenario, testing::ValuesIn(scenarios()
 // The controller begins anew in the very tick after its silence, and must do so after a snapshot in between as well.
 TEST(Snapshot, OfTheLastTicksOfASilenceKnowsOfIt) {
     expect_same_from("silent_controller", {3.998, 3.999, 4, 4.001}, 6);
+}
+
+// What happens to the calibration's file afterwards is nothing to a snapshot.
+TEST(Snapshot, HoldsItsCalibration) {
+    TemporaryFile file(".lcmlog"), calibration(".yaml");
+    const std::string shipped = io::read_text(shipped_calibration());
+    std::string text = shipped;
+    const std::string relative = "../can/tractor.yaml";
+    text.replace(text.find(relative), relative.size(), SHIFTRIG_SOURCE_DIR "/config/can/tractor.yaml");
+    std::ofstream(calibration.path) << text;
+    Choices choices;
+    choices.scenario = SHIFTRIG_SOURCE_DIR "/config/scenarios/plough_upshift.yaml";
+    choices.controller = "builtin:" + calibration.path;
+    const rig::Setup setup = make_setup(choices);
+    write_snapshot_at(file.path, 2.1, setup);
+    std::filesystem::remove(calibration.path);
+
+    const io::Manifest snapshot = io::read_snapshot(file.path);
+    Rig continued(setup_of(snapshot)), whole(setup);
+    resume(continued, snapshot);
+    while (whole.ticks() < continued.ticks()) whole.tick();
+    for (int tick = 0; tick < 500; ++tick) {
+        whole.tick();
+        continued.tick();
+        ASSERT_NO_FATAL_FAILURE(expect_same_tick(whole, continued));
+    }
+}
+
+TEST(Snapshot, WithoutItsCalibrationIsRefused) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 0.1);
+    io::Manifest snapshot = io::read_snapshot(file.path);
+    snapshot.facts.erase("calibration_text");
+    EXPECT_THROW(setup_of(snapshot), io::InputError);
 }
 
 TEST(Snapshot, OfAnotherMachineIsRefused) {
