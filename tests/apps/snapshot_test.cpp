@@ -240,6 +240,52 @@ TEST(Fork, UnknownNameIsToldWithItsNeighbours) {
     }
 }
 
+std::string fork_refusal(const std::string& path, const std::string& vary) {
+    try {
+        forked(path, {vary}, 1, 2);
+        return "";
+    } catch (const io::InputError& error) {
+        return error.what();
+    }
+}
+
+TEST(Fork, SignalBeyondItsRangeIsRefusedBeforeAnyBranch) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 0.1);
+    EXPECT_EQ(fork_refusal(file.path, "clutch.F3.leak=0,2"),
+              "--vary clutch.F3.leak = 2; must be within 0 and 1");
+    EXPECT_EQ(fork_refusal(file.path, "environment.grade_percent=0:2000"),
+              "--vary environment.grade_percent = 2000; must be within -1000 and 1000");
+    EXPECT_EQ(fork_refusal(file.path, "driver.throttle=+-60%"),
+              "--vary driver.throttle = 1.16496; must be within 0 and 1");
+    EXPECT_EQ(fork_refusal(file.path, "driver.lever=2,2.5"),
+              "--vary driver.lever = 2.5; must be a whole number");
+    EXPECT_EQ(fork_refusal(file.path, "driver.lever=2:3"),
+              "--vary driver.lever: takes whole numbers; write NAME=A,B,C");
+    EXPECT_EQ(fork_refusal(file.path, "mass.vehicle.speed_kmh=3"),
+              "--vary mass.vehicle.speed_kmh: this signal is not the user's to set");
+}
+
+TEST(Fork, BranchesThatCannotRunStandLast) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 2.14);
+    const auto branches = forked(file.path, {"model.masses.vehicle.mass_kg=-5,7000"}, 1);
+    ASSERT_EQ(branches.size(), 2u);
+    EXPECT_EQ(branches[0].error, "");
+    EXPECT_TRUE(branches[1].refused);
+    EXPECT_TRUE(branches[1].error.ends_with("mass_kg = -5; must be > 0")) << branches[1].error;
+}
+
+TEST(Fork, BranchThatDoesNotStayFiniteIsNotJudged) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 2.14);
+    const auto branches = forked(file.path, {"model.masses.vehicle.mass_kg=1e-300"}, 1);
+    ASSERT_EQ(branches.size(), 1u);
+    EXPECT_FALSE(branches[0].refused);
+    EXPECT_FALSE(branches[0].shifted);
+    EXPECT_TRUE(branches[0].error.ends_with("ticks the state is not finite")) << branches[0].error;
+}
+
 TEST(Variation, IsReadAsWritten) {
     EXPECT_EQ(parse_variation("clutch.F3.leak=0,0.5").values, (std::vector<double>{0, 0.5}));
     EXPECT_EQ(parse_variation("calibration.a.b=1:2:3").values, (std::vector<double>{1, 1.5, 2}));
