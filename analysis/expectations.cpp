@@ -70,7 +70,8 @@ class Judge {
             const std::string at = "shift " + shift.label() + " at " + seconds(shift.asked_at);
             if (i >= wanted.size())
                 broken(
-                    wanted.empty() ? 0 : wanted.back().line, wanted.empty() ? 0 : wanted.back().column,
+                    wanted.empty() ? scenario_.expect.no_shifts_line : wanted.back().line,
+                    wanted.empty() ? 0 : wanted.back().column,
                     at + " found; none expected" + (wanted.empty() ? "" : " after " + wanted.back().shift));
             else if (shift.label() != wanted[i].shift)
                 broken(wanted[i].line, wanted[i].column, at + " found; expected " + wanted[i].shift);

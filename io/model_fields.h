@@ -14,6 +14,7 @@
 namespace shiftrig::io {
 
 using namespace rules;
+inline constexpr Rule dead_time{0, 10};  // [s]: a delay line that fits into memory
 
 // ---- what the file says and plant::Description does not hold -----------------------------------------
 
@@ -112,7 +113,8 @@ void fields(Fields& f, plant::DryFriction& d) {
                       "e^(−|Δω|/falling_speed)) [0]");
     f.optional_number("falling_speed_rad_s", d.falling_speed, positive, "slip speed of that fall [1]");
     f.optional_table("factor_over_slip_rad_s", d.factor_over_slip, 1, 1,
-                     "instead: [[rad/s, factor of sliding_capacity], …], piecewise linear");
+                     "instead: [[rad/s, factor of sliding_capacity], …], piecewise linear",
+                     {any, not_negative});
 }
 
 template <class Fields>
@@ -168,7 +170,7 @@ void fields(Fields& f, plant::Solenoid& s) {
 
 template <class Fields>
 void fields(Fields& f, plant::ActuationHydraulic& h) {
-    f.number("dead_time_s", h.dead_time, not_negative, "of the valve with warm oil");
+    f.number("dead_time_s", h.dead_time, dead_time, "of the valve with warm oil");
     f.number("natural_frequency_rad_s", h.natural_frequency, positive, "of the valve");
     f.number("damping_ratio", h.damping_ratio, positive, "of the valve");
     f.number("slew_bar_per_s", h.slew, positive, "steepest change of pressure");
@@ -297,7 +299,7 @@ void fields(Fields& f, plant::BrixiusTyre& t) {
     f.link("wheel", t.wheel, "rotating mass");
     f.link("body", t.body, "translating mass");
     f.number("radius_m", t.radius, positive, "rolling radius");
-    f.number("mobility_number", t.mobility_number, positive,
+    f.number("mobility_number", t.mobility_number, at_least_one,
              "Brixius Bn: about 80 hard, 55 firm, 40 tilled, 20 soft; the input "
              "environment.mobility_number is that of the first tyre and changes the others in proportion");
     f.number("relaxation_length_m", t.relaxation_length, positive, "way the force takes to follow the slip");

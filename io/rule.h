@@ -21,6 +21,9 @@ struct Rule {
     std::string words() const;  // "must be > 0"
 };
 
+// A number as messages have it: "0.05", "1e+06".
+std::string in_digits(double value);
+
 // Of a table [[x, y], …]; that x rises goes without saying.
 struct Columns {
     Rule x, y;

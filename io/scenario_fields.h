@@ -17,6 +17,7 @@ struct TimelineText {
     double at = 0, over = 0;
     std::string note;
     std::vector<Setting> settings;
+    int line = 0, column = 0;
 };
 
 struct ShiftText {

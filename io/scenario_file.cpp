@@ -12,12 +12,27 @@ namespace shiftrig::io {
 
 namespace {
 
-std::vector<TimedSetting> by_time(const std::vector<TimelineText>& timeline) {
+std::vector<TimedSetting> by_time(const std::string& path, const std::vector<TimelineText>& timeline,
+                                  double duration) {
     std::vector<TimedSetting> result;
-    for (const auto& moment : timeline)
+    for (const auto& moment : timeline) {
+        if (moment.settings.empty())
+            throw InputError(path, moment.line, moment.column, "timeline: sets no signal");
+        if (moment.at >= duration)
+            throw InputError(path, moment.line, moment.column,
+                             "timeline: at_s = " + in_digits(moment.at) +
+                                 "; must be before the end, duration_s = " + in_digits(duration));
         for (const auto& setting : moment.settings) result.push_back({moment.at, moment.over, setting});
+    }
     std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
     return result;
+}
+
+// Where a key stands; 0 if it is not there.
+int line_of(const ReadContext& context, const std::string& key) {
+    for (const auto& place : context.places)
+        if (place.key == key) return place.line;
+    return 0;
 }
 
 Expectations expectations(const std::string& path, const ExpectText& text) {
@@ -56,8 +71,9 @@ Expectations expectations(const std::string& path, const ExpectText& text) {
     return expect;
 }
 
-void check(const ScenarioFile& scenario, const NamedQuantity& quantity, const std::string& name,
-           const SignalTable& signals) {
+// The signal of that name.
+const plant::Signal& check(const ScenarioFile& scenario, const NamedQuantity& quantity,
+                           const std::string& name, const SignalTable& signals) {
     const int index = signals.find(name);
     if (index < 0) {
         const auto near = signals.nearest(name, 1);
@@ -65,11 +81,22 @@ void check(const ScenarioFile& scenario, const NamedQuantity& quantity, const st
                          quantity.written + " is no signal of this model" +
                              (near.empty() ? "" : "; nearest: " + near.front()));
     }
-    const plant::Unit unit = signals.signal(index).unit;
-    if (unit != quantity.unit)
+    const plant::Signal& signal = signals.signal(index);
+    if (signal.unit != quantity.unit)
         throw InputError(scenario.path, quantity.line, quantity.column,
                          quantity.written + " must be written with its unit: " + quantity.signal +
-                             " ends in " + suffixes_of(unit));
+                             " ends in " + suffixes_of(signal.unit));
+    return signal;
+}
+
+// A value that the rig would have to limit is none that anybody meant: percent for a share, bar for Pa.
+void check_setting(const ScenarioFile& scenario, const Setting& setting, const SignalTable& signals) {
+    const NamedQuantity& quantity = setting.quantity;
+    const plant::Signal& signal = check(scenario, quantity, quantity.signal, signals);
+    if (rule_of(signal).holds(setting.value)) return;
+    throw InputError(scenario.path, quantity.line, quantity.column,
+                     quantity.written + " = " + in_digits(setting.value / quantity.factor) + "; " +
+                         rule_of(signal, quantity.factor).words());
 }
 
 }  // namespace
@@ -88,8 +115,11 @@ ScenarioFile parse_scenario(const std::string& text, const std::string& path) {
     scenario.text = text;
     scenario.name = place.stem().string();
     scenario.model_path = (place.parent_path() / written.model).lexically_normal().string();
-    scenario.timeline = by_time(written.timeline);
+    scenario.start.options_line = line_of(context, "start.options");
+    scenario.start.locked_line = line_of(context, "start.locked");
+    scenario.timeline = by_time(path, written.timeline, scenario.duration);
     scenario.expect = expectations(path, written.expect);
+    scenario.expect.no_shifts_line = line_of(context, "expect.no_shifts");
     return scenario;
 }
 
@@ -100,10 +130,8 @@ ScenarioFile read_scenario(const std::string& path) {
 void check_signals(const ScenarioFile& scenario, const SignalTable& signals) {
     for (const auto& speed : scenario.start.speeds)
         check(scenario, speed.quantity, "mass." + speed.quantity.signal + ".speed", signals);
-    for (const auto& input : scenario.start.inputs)
-        check(scenario, input.quantity, input.quantity.signal, signals);
-    for (const auto& moment : scenario.timeline)
-        check(scenario, moment.setting.quantity, moment.setting.quantity.signal, signals);
+    for (const auto& input : scenario.start.inputs) check_setting(scenario, input, signals);
+    for (const auto& moment : scenario.timeline) check_setting(scenario, moment.setting, signals);
     for (const auto& bound : scenario.expect.signals)
         check(scenario, bound.quantity, bound.quantity.signal, signals);
 }

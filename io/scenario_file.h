@@ -58,7 +58,8 @@ struct ScenarioStart {
     std::vector<std::string> locked;                           // devices locked at the start
     std::vector<Setting> speeds;  // quantity.signal is the mass's name; [rad/s] or [m/s]
     std::vector<Setting> inputs;  // held from the start on (plant's and driver's signals)
-    double settle = 0;            // [s] the plant runs under `inputs` before time 0, without the controller
+    int options_line = 0, locked_line = 0;
+    double settle = 0;  // [s] the plant runs under `inputs` before time 0, without the controller
 };
 
 struct Window {
@@ -102,6 +103,7 @@ struct SignalBound {
 struct Expectations {
     std::vector<ExpectedShift> shifts;
     bool shifts_given = false;  // true: exactly these, an empty list means no shift at all
+    int no_shifts_line = 0;
     std::vector<MetricLimit> metrics;
     std::vector<ExpectedEvent> events;
     std::vector<SignalBound> signals;
@@ -127,8 +129,8 @@ struct ScenarioFile {
 ScenarioFile read_scenario(const std::string& path);
 ScenarioFile parse_scenario(const std::string& text, const std::string& path);
 
-// Every signal the scenario names exists and is written in its own unit; throws InputError naming the place
-// and the nearest signal. Masses in start.speeds are checked against `mass.<name>.speed`.
+// Every signal the scenario names exists, is written in its own unit and set within its range; throws InputError naming
+// the place, and the nearest signal or the rule. Masses in start.speeds are checked against `mass.<name>.speed`.
 void check_signals(const ScenarioFile& scenario, const SignalTable& signals);
 
 nlohmann::ordered_json scenario_schema();

@@ -6,6 +6,14 @@
 
 namespace shiftrig::io {
 
+Rule rule_of(const plant::Signal& signal, double factor) {
+    constexpr double unlimited = 1e300;  // as plant::Signal has it
+    Rule rule;
+    if (signal.minimum > -unlimited) rule.minimum = signal.minimum / factor;
+    if (signal.maximum < unlimited) rule.maximum = signal.maximum / factor;
+    return rule;
+}
+
 int SignalTable::add(const plant::Signal& signal) {
     const int index = size();
     if (!index_.emplace(signal.name, index).second)

@@ -9,9 +9,13 @@
 #include <string_view>
 #include <vector>
 
+#include "io/rule.h"
 #include "plant/signal.h"
 
 namespace shiftrig::io {
+
+// What somebody may set this signal to, in a unit of `factor` SI units.
+Rule rule_of(const plant::Signal& signal, double factor = 1);
 
 class SignalTable {
   public:

@@ -48,7 +48,7 @@ const UnitSpelling* unit_spelling(std::string_view name) {
 }
 
 std::string suffixes_of(plant::Unit unit) {
-    std::string text;
+    std::string text = unit == Unit::one ? "no suffix" : "";
     for (const auto& spelling : spellings) {
         if (spelling.unit != unit) continue;
         if (!text.empty()) text += " or ";

@@ -23,6 +23,7 @@ struct BusSetup {
     std::vector<std::string> names;            // as the user gives them; see apps/bus/bus.h
     std::optional<tcu::Calibration> built_in;  // the reference controller on `inprocess`
     std::string calibration_path;              // where that was read from
+    std::string calibration_text;              // and what stood there: a snapshot holds it
     std::vector<Silence> silences;             // of the built-in controller
     bool lockstep = false;
     std::string can_log, can_replay;  // of the first CAN bus; see bus::Options

@@ -99,8 +99,8 @@ void choose_controller(const Choices& choices, Setup& setup) {
     if (needs_a_bus && !inprocess_given()) buses.names.push_back("inprocess");
     if (!is_built_in(controller)) return;
     const std::string given = controller.size() > 8 ? controller.substr(8) : scripted.calibration;
-    buses.calibration_path = given.empty() ? shipped_calibration() : given;
-    buses.built_in = tcu::read_calibration(buses.calibration_path);
+    const std::string path = given.empty() ? shipped_calibration() : given;
+    build_in(buses, io::read_text(path), path);
 }
 
 Setup complete(const Choices& choices, Setup setup) {
@@ -123,6 +123,13 @@ void follow_scenario(const io::ScenarioFile& scenario, BusSetup& buses) {
     if (!scenario.bus_faults.IsDefined()) return;
     buses.faults = scenario.bus_faults;
     buses.faults_file = scenario.path;
+}
+
+void build_in(BusSetup& buses, const std::string& calibration_text, const std::string& calibration_path) {
+    buses.calibration_path = calibration_path;
+    buses.calibration_text = calibration_text;
+    buses.built_in =
+        tcu::parse_calibration(io::parse_yaml(calibration_text, calibration_path), calibration_path);
 }
 
 std::string shipped_calibration() {

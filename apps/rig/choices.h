@@ -29,6 +29,9 @@ Setup make_setup(const Choices& choices, io::ScenarioFile scenario);
 // InputError.
 void follow_scenario(const io::ScenarioFile& scenario, BusSetup& buses);
 
+// Puts the built-in controller on the in-process bus, with this calibration. Throws InputError.
+void build_in(BusSetup& buses, const std::string& calibration_text, const std::string& calibration_path);
+
 // The calibration of the built-in controller where nobody names another: a file.
 std::string shipped_calibration();
 

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "apps/rig/snapshot.h"
+#include "io/signals.h"
 #include "io/units.h"
 #include "io/yaml_document.h"
 
@@ -29,7 +30,7 @@ class Brancher {
             throw io::InputError(
                 "the snapshot's controller was not the built-in one: its state is not in the snapshot");
         if (!setup_.buses.calibration_path.empty())
-            calibration_.emplace(io::read_text(setup_.buses.calibration_path), setup_.buses.calibration_path);
+            calibration_.emplace(setup_.buses.calibration_text, setup_.buses.calibration_path);
         for (const auto& v : plan.variations()) rebuilds_ = rebuilds_ || v.target == Variation::Target::model;
         if (rebuilds_) model_.emplace(snapshot.model_text, snapshot.model_path);
         for (const auto& v : plan.variations())
@@ -39,7 +40,7 @@ class Brancher {
         resume(*rig_, snapshot);  // if it does not fit, no branch can run
         ticks_ = std::llround(options.duration * 1e9 / static_cast<double>(setup_.tick_ns));
         for (const auto& v : plan.variations())
-            signals_.push_back(v.target == Variation::Target::signal ? find(v.name) : Settable{});
+            signals_.push_back(v.target == Variation::Target::signal ? found(v) : Settable{});
 
         // The history's columns that the rig still has, with room for the branch.
         run_.machine = setup_.model.description;
@@ -61,15 +62,24 @@ class Brancher {
         try {
             prepare(branch.values);
         } catch (const std::exception& error) {
+            branch.refused = true;
             branch.error = error.what();
             rig_ = std::make_unique<Rig>(setup_);
             return branch;
         }
+        RunCertificate certificate;
         for (std::size_t row = history_rows_; row < run_.time.size(); ++row) {
             rig_->tick();
             run_.time[row] = rig_->sim_time();
             for (std::size_t c = 0; c < indices_.size(); ++c)
                 run_.columns[c].value[row] = rig_->value(indices_[c]);
+            certificate.take(rig_->certificate());
+        }
+        if (!certificate.is_finite()) {  // nothing to judge
+            branch.error = "in " + std::to_string(certificate.flagged[2]) + " of " +
+                           std::to_string(certificate.ticks) + " ticks the state is not finite";
+            rig_ = std::make_unique<Rig>(setup_);
+            return branch;
         }
         judge(branch);
         return branch;
@@ -93,6 +103,27 @@ class Brancher {
         for (const auto& known : table.nearest(name)) near += (near.empty() ? "" : ", ") + known;
         throw io::InputError("--vary " + name +
                              ": no such signal, or without its unit's suffix; near: " + near);
+    }
+
+    // The signal varied, within its range in every branch.
+    Settable found(const Variation& v) const {
+        const Settable settable = find(v.name);
+        if (!rig_->is_settable(settable.signal))
+            throw io::InputError("--vary " + v.name + ": this signal is not the user's to set");
+        const auto& signal = rig_->signals().signal(settable.signal);
+        const bool whole = takes_whole_numbers(signal.name);
+        if (whole && v.values.empty())
+            throw io::InputError("--vary " + v.name + ": takes whole numbers; write NAME=A,B,C");
+        for (const double value : v.values.empty() ? std::vector{v.low, v.high} : v.values) {
+            const double wanted = value * (v.relative ? rig_->value(settable.signal) : settable.factor);
+            const auto refuse = [&](const std::string& rule) {
+                throw io::InputError("--vary " + v.name + " = " + io::in_digits(wanted / settable.factor) +
+                                     "; " + rule);
+            };
+            if (!io::rule_of(signal).holds(wanted)) refuse(io::rule_of(signal, settable.factor).words());
+            if (whole && wanted != std::floor(wanted)) refuse("must be a whole number");
+        }
+        return settable;
     }
 
     // The branch's values in the texts of the model and the calibration.
@@ -125,8 +156,7 @@ class Brancher {
             const double wanted = variations[i].relative ? values[i] * rig_->value(signals_[i].signal)
                                                          : values[i] * signals_[i].factor;
             if (!rig_->request(signals_[i].signal, wanted))
-                throw io::InputError("--vary " + variations[i].name +
-                                     ": this signal is not the user's to set");
+                throw io::InputError("--vary " + variations[i].name + ": more signals than a tick takes");
         }
     }
 
@@ -163,6 +193,7 @@ class Brancher {
 };
 
 bool better(const Branch& a, const Branch& b) {
+    if (a.error.empty() != b.error.empty()) return a.error.empty();
     if (a.completed != b.completed) return a.completed;
     if (a.shifted != b.shifted) return a.shifted;
     if (a.verdict != b.verdict) return a.verdict < b.verdict;

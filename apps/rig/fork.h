@@ -22,7 +22,8 @@ struct Branch {
     analysis::Verdict verdict = analysis::Verdict::reject;
     double burden = 0;  // mean of metric / its reject limit over the judged metrics: less is better
     std::vector<analysis::Metric> metrics;
-    std::string error;  // the branch could not run: a varied value is out of its range
+    bool refused = false;  // could not begin: the model or the calibration does not take a varied value
+    std::string error;     // why it was refused, or that its state was not finite; empty: it ran
 };
 
 struct ForkOptions {
@@ -30,8 +31,8 @@ struct ForkOptions {
     int threads = 0;        // 0: as many as there are processors
 };
 
-// Best first: completed, then verdict, then burden, then number. `done` counts finished branches. Throws InputError
-// if a name cannot be varied.
+// Best first: those that ran, completed, then verdict, then burden, then number. `done` counts finished branches. Throws InputError
+// if a name cannot be varied, or a signal not to these values.
 std::vector<Branch> fork(const io::Manifest& snapshot, const Plan& plan, const ForkOptions& options,
                          std::atomic<std::int64_t>& done);
 

@@ -1,6 +1,7 @@
 #include "apps/rig/rig.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace shiftrig::rig {
 
@@ -17,8 +18,13 @@ plant::Model build(const Setup& setup) {
 // What the scenario chooses before anything is built: gear options, and the seed of what is drawn at random.
 Setup with_options(Setup setup) {
     if (!setup.scenario) return setup;
-    for (const auto& [gear, option] : setup.scenario->start.options)
-        io::select_option(setup.model.description, gear, option);
+    const auto& start = setup.scenario->start;
+    try {
+        for (const auto& [gear, option] : start.options)
+            io::select_option(setup.model.description, gear, option);
+    } catch (const std::invalid_argument& error) {
+        throw io::InputError(setup.scenario->path, start.options_line, 0, error.what());
+    }
     setup.buses.seed = static_cast<std::uint64_t>(setup.scenario->seed);
     return setup;
 }
@@ -93,6 +99,7 @@ void Rig::begin() {
     } else {
         const auto& scenario = *setup_.scenario;
         io::check_signals(scenario, signals_);
+        check_whole_numbers(scenario);
         timeline_ = Timeline(scenario, signals_, settable_);
         for (const auto& setting : scenario.start.inputs)
             signals_.value[static_cast<std::size_t>(
@@ -103,11 +110,22 @@ void Rig::begin() {
         start.locked = scenario.start.locked;
         for (const auto& speed : scenario.start.speeds)
             start.speeds.emplace_back(speed.quantity.signal, speed.value);
-        if (!start.locked.empty() || !start.speeds.empty()) plant::start(model_, state_, start, inputs_);
+        if (!start.locked.empty() || !start.speeds.empty()) start_plant(start, scenario);
         settle(scenario.start.settle);
     }
     plant::observe(model_, operators_, state_, inputs_, outputs_, scratch_);
     publish();
+}
+
+void Rig::start_plant(const plant::Start& start, const io::ScenarioFile& scenario) {
+    try {
+        plant::start(model_, state_, start, inputs_);
+    } catch (const plant::ModelError& error) {
+        int line = scenario.start.locked_line;
+        for (const auto& speed : scenario.start.speeds)
+            if (error.field == "speeds" && speed.quantity.signal == error.device) line = speed.quantity.line;
+        throw io::InputError(scenario.path, line, 0, error.what());
+    }
 }
 
 void Rig::settle(double seconds) {

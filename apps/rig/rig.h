@@ -100,6 +100,7 @@ class Rig {
         return certificate_;
     }  // worst and sums over the substeps
 
+    bool is_settable(int signal) const noexcept { return settable_[static_cast<std::size_t>(signal)]; }
     // A change of an input or of a driver's signal from another thread, taken at the next tick; false if `signal` may
     // not be set or too many are waiting. One thread only.
     bool request(int signal, double value) noexcept;
@@ -128,6 +129,7 @@ class Rig {
     };
     plant::Model build_changed(Setup& changed, io::ModelFile model) const;
     void begin();
+    void start_plant(const plant::Start& start, const io::ScenarioFile& scenario);
     void settle(double seconds);
     void take_requests() SHIFTRIG_REALTIME;
     void copy_inputs() SHIFTRIG_REALTIME;

@@ -63,6 +63,7 @@ void SnapshotTaker::write(const std::string& path, const Rig& rig, const rt::Loo
     manifest.initial_state = state_;
     manifest.assembly = assembly_;
     const double at = 1e-9 * static_cast<double>(tick_ * manifest.tick_ns);
+    if (rig.setup().buses.built_in) manifest.facts["calibration_text"] = rig.setup().buses.calibration_text;
     manifest.history = pack(run, analysis::scorecard_signals(run.machine), at);
     io::write_snapshot(path, manifest);
 }
@@ -86,9 +87,13 @@ Setup setup_of(const io::Manifest& snapshot) {
     std::istringstream buses(fact("buses"));
     for (std::string name; buses >> name;) setup.buses.names.push_back(name);
     setup.buses.lockstep = fact("pace") == "lockstep";
-    setup.buses.calibration_path = fact("calibration");
-    if (!setup.buses.calibration_path.empty())
-        setup.buses.built_in = tcu::read_calibration(setup.buses.calibration_path);
+    if (const std::string path = fact("calibration"); !path.empty()) {
+        const std::string text = fact("calibration_text");
+        if (text.empty())
+            throw io::InputError(
+                "the snapshot does not hold its controller's calibration: it is of an earlier version");
+        build_in(setup.buses, text, path);
+    }
     setup.resumes = true;
     return setup;
 }

@@ -30,7 +30,8 @@ class SnapshotTaker {
     std::vector<std::byte> assembly_, state_;
 };
 
-// The set-up that a snapshot was made with: model and scenario as they were, the same buses and calibration file.
+// The set-up that a snapshot was made with: model, scenario and calibration as they were, the same buses. Throws
+// InputError.
 Setup setup_of(const io::Manifest& snapshot);
 // Brings a rig of that set-up to where the snapshot was taken. Throws InputError if it does not fit.
 void resume(Rig& rig, const io::Manifest& snapshot);

@@ -15,6 +15,26 @@ int find_settable(const io::SignalTable& signals, const std::vector<bool>& setta
                                     : quantity.written + ": there is no such input; near it: " + near);
 }
 
+bool takes_whole_numbers(const std::string& signal) {
+    return signal == "driver.lever";
+}
+
+void check_whole_numbers(const io::ScenarioFile& scenario) {
+    const auto check = [&](const io::Setting& setting, double over) {
+        const auto& quantity = setting.quantity;
+        if (!takes_whole_numbers(quantity.signal)) return;
+        const auto refuse = [&](const std::string& what) {
+            throw io::InputError(scenario.path, quantity.line, quantity.column, what);
+        };
+        if (setting.value != std::floor(setting.value))
+            refuse(quantity.written + " = " + io::in_digits(setting.value / quantity.factor) +
+                   "; must be a whole number");
+        if (over > 0) refuse(quantity.written + " takes whole numbers; with it over_s must be 0");
+    };
+    for (const auto& input : scenario.start.inputs) check(input, 0);
+    for (const auto& moment : scenario.timeline) check(moment.setting, moment.over);
+}
+
 Timeline::Timeline(const io::ScenarioFile& scenario, const io::SignalTable& signals,
                    const std::vector<bool>& settable) {
     for (const auto& timed : scenario.timeline)

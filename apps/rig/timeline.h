@@ -17,6 +17,11 @@ namespace shiftrig::rig {
 int find_settable(const io::SignalTable& signals, const std::vector<bool>& settable, const std::string& path,
                   const io::NamedQuantity& quantity);
 
+// The lever stands in a gear, and in none between two: a signal that takes whole numbers, at once.
+bool takes_whole_numbers(const std::string& signal);
+// Throws InputError where the scenario has it otherwise.
+void check_whole_numbers(const io::ScenarioFile& scenario);
+
 class Timeline {
   public:
     // One entry of the scenario and how far it has come; plain data, so that a snapshot is a copy.

@@ -1,6 +1,7 @@
 // shiftrig fork: what if? Many branches from one snapshot, ranked.
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -83,6 +84,20 @@ void print(const std::vector<rig::Branch>& branches, const rig::Plan& plan, int 
     std::printf("%zu branches, %lld shifts completed\n", branches.size(), static_cast<long long>(completed));
 }
 
+// Branches that could not run are part of the answer, unless nothing else is.
+int exit_code(const std::vector<rig::Branch>& branches) {
+    const auto refused =
+        std::count_if(branches.begin(), branches.end(), [](const auto& b) { return b.refused; });
+    const auto ran =
+        std::count_if(branches.begin(), branches.end(), [](const auto& b) { return b.error.empty(); });
+    const auto all = static_cast<std::ptrdiff_t>(branches.size());
+    if (refused > 0) std::cerr << "refused: " << refused << " of " << all << " branches\n";
+    if (ran + refused < all)
+        std::cerr << "not finite: " << all - ran - refused << " of " << all << " branches\n";
+    if (ran > 0) return good;
+    return refused == all ? bad_input : failed;
+}
+
 int run(const Options& options) {
     const io::Manifest snapshot = io::read_snapshot(options.snapshot);
     std::vector<rig::Variation> variations;
@@ -121,7 +136,7 @@ int run(const Options& options) {
         print(branches, plan, options.top);
     }
     std::cerr << wall << " s, " << static_cast<double>(plan.branches()) / wall << " branches/s\n";
-    return good;
+    return exit_code(branches);
 }
 
 Command::Run declare(CLI::App& app) {

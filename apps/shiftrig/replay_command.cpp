@@ -5,15 +5,18 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/command.h"
+#include "io/nearest.h"
 #include "io/recording/candump.h"
 #include "io/recording/csv.h"
 #include "io/recording/field.h"
 #include "io/recording/reader.h"
 #include "io/recording/rebuild.h"
 #include "io/recording/replay.h"
+#include "io/signals.h"
 #include "io/units.h"
 
 namespace shiftrig::cli {
@@ -26,6 +29,7 @@ struct Options {
     // Of a field recording only.
     std::vector<std::string> locked, options, held;
     double step_s = 1e-3;
+    std::vector<const CLI::Option*> of_fields;  // the options that set these
     bool json = false;
 };
 
@@ -129,14 +133,25 @@ io::FieldRecording read_field(const Options& options, const io::ModelFile& file)
 }
 
 // An input that nobody measured: `environment.draft=1`.
-void hold_input(const std::string& held, io::FieldRecording& recording) {
+void hold_input(const std::string& held, const plant::Model& model, io::FieldRecording& recording) {
     const auto [name, value] = named_number("--hold", held);
-    io::FieldColumn column;
-    column.written = column.signal = name;
-    if (const auto* unit = io::unit_spelling(column.written)) {
-        column.signal = column.written.substr(0, name.size() - unit->suffix.size());
-        column.factor = unit->factor;
+    io::FieldColumn column = io::field_column(name);
+    const auto refuse = [&, name = name](const std::string& what) {
+        throw std::invalid_argument("--hold " + name + what);
+    };
+    const int input = model.input(column.signal);
+    if (input < 0) {
+        std::vector<std::string> known;
+        for (const auto& signal : model.inputs()) known.push_back(signal.name);
+        refuse(" is no input of the model" + io::nearest_hint(column.signal, known));
     }
+    const plant::Signal& signal = model.inputs()[static_cast<std::size_t>(input)];
+    if (column.unit != signal.unit)
+        refuse(" must be written with its unit: " + signal.name + " ends in " + io::suffixes_of(signal.unit));
+    if (!io::rule_of(signal).holds(value * column.factor))
+        refuse(" = " + io::in_digits(value) + "; " + io::rule_of(signal, column.factor).words());
+    for (const auto& measured : recording.columns)
+        if (measured.signal == column.signal) refuse(": the recording or another --hold has it already");
     column.value.assign(recording.time.size(), value * column.factor);
     recording.columns.push_back(std::move(column));
 }
@@ -146,17 +161,25 @@ int run_field(const Options& options) {
     if (options.model.empty()) throw io::InputError(options.recording + ": a field recording needs --model");
     io::ModelFile file = io::read_model(options.model);
     io::FieldRecording recording = read_field(options, file);
-    for (const auto& held : options.held) hold_input(held, recording);
     for (const auto& text : options.options) {
         const auto [gear, option] = named_word("--option", text);
         io::select_option(file.description, gear, option);
     }
     plant::BuildOptions build;
     build.step_size = options.step_s;
-    const io::FieldFit fit = io::replay_field(recording, io::build_model(file, build), options.locked);
+    const plant::Model model = io::build_model(file, build);
+    for (const auto& held : options.held) hold_input(held, model, recording);
+    const io::FieldFit fit = io::replay_field(recording, model, options.locked);
+    for (const auto& column : fit.limited)
+        std::cerr << options.recording << ": " << column.written << " " << column.rule << "; limited in "
+                  << column.rows << " of " << recording.time.size() << " rows\n";
     if (options.json) {
-        nlohmann::json out{
-            {"driven", fit.driven}, {"ignored", fit.ignored}, {"fits", nlohmann::json::array()}};
+        nlohmann::json out{{"driven", fit.driven},
+                           {"ignored", fit.ignored},
+                           {"limited", nlohmann::json::array()},
+                           {"fits", nlohmann::json::array()}};
+        for (const auto& column : fit.limited)
+            out["limited"].push_back({{"column", column.written}, {"rows", column.rows}});
         for (const auto& f : fit.fits)
             out["fits"].push_back({{"column", f.written},
                                    {"unit", plant::symbol(f.unit)},
@@ -182,6 +205,10 @@ int run_field(const Options& options) {
 int run(const Options& options) {
     if (options.recording.ends_with(".csv") || io::looks_like_candump(options.recording))
         return run_field(options);
+    for (const auto* option : options.of_fields)
+        if (option->count() > 0)
+            throw std::invalid_argument(option->get_name() +
+                                        ": only of field recordings (.csv, candump log)");
     io::RecordingReader reader(options.recording);
     try {
         return run_on(reader, options);
@@ -206,6 +233,7 @@ Command::Run declare(CLI::App& app) {
                       "an input that was not measured, held: environment.draft=1; repeatable");
     add_number(*field, "--step", options->step_s, {1e-6, 1}, "step size of the plant [s]")
         ->capture_default_str();
+    for (const auto* option : field->get_options()) options->of_fields.push_back(option);
     app.add_flag("--json", options->json, "print one JSON object");
     return [options] { return run(*options); };
 }

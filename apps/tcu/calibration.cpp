@@ -147,6 +147,13 @@ Calibration parse_calibration(const YAML::Node& root, const std::string& path) {
     io::FieldReader reader(context, root, root.Mark(), "", "");
     fields(reader, calibration);
     reader.finish();
+    const auto& clutch = calibration.clutch;
+    if (clutch.touch_pressure > clutch.full_pressure)
+        for (const auto& place : context.places)
+            if (place.key == "clutch.touch_pressure_bar")
+                throw io::InputError(
+                    path, place.line, place.column,
+                    place.key + " = " + place.written + "; must be at most full_pressure_bar");
     calibration.bus.mapping = (std::filesystem::path(path).parent_path() / calibration.bus.mapping).string();
     return calibration;
 }

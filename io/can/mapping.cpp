@@ -8,6 +8,7 @@
 #include <functional>
 #include <initializer_list>
 #include <iomanip>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -169,6 +170,7 @@ class Reader {
                 fail(range, label + ": plausible must be [lowest, highest]");
             result.plausible = {number(range[0]), number(range[1])};
         }
+        if (node["is"] && node["when"]) fail(node["when"], label + ": is and when exclude each other");
         if (node["enable"]) result.enable = layout_signal(node["enable"], layout);
         if (node["disabled"]) result.disabled = number(node["disabled"]);
         if (const YAML::Node when = node["when"]) {
@@ -258,6 +260,10 @@ class Reader {
     // What is written as something else would look like an empty one. A key without a value is one.
     YAML::Node map(const YAML::Node& node, const std::string& what) const {
         if (!node.IsMap() && !node.IsNull()) fail(node, what + ": keys and values are wanted");
+        std::set<std::string> seen;
+        for (const auto& entry : node)
+            if (!seen.insert(text(entry.first)).second)
+                fail(entry.first, what + ": \"" + text(entry.first) + "\" is given twice");
         return node;
     }
     YAML::Node list(const YAML::Node& node, const std::string& what) const {
@@ -267,6 +273,7 @@ class Reader {
     void keys(const YAML::Node& node, const std::string& what,
               std::initializer_list<std::string_view> known) const {
         if (!node.IsMap()) fail(node, what + ": keys and values are wanted");
+        map(node, what);
         for (const auto& entry : node)
             if (std::find(known.begin(), known.end(), text(entry.first)) == known.end())
                 fail(entry.first, what + ": unknown key \"" + text(entry.first) + "\"");

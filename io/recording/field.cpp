@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "io/input_error.h"
+#include "io/signals.h"
 #include "io/units.h"
 
 namespace shiftrig::io {
@@ -48,7 +49,31 @@ std::string mass_of(const std::string& signal, const plant::Description& machine
     return "";
 }
 
+void check_unit(const FieldRecording& recording, const FieldColumn& column, const plant::Signal& signal) {
+    if (column.unit == signal.unit) return;
+    throw InputError(recording.path, 1, 0,
+                     column.written + " must be written with its unit: " + signal.name + " ends in " +
+                         suffixes_of(signal.unit));
+}
+
+std::size_t rows_beyond(const plant::Signal& input, const FieldColumn& column) {
+    return static_cast<std::size_t>(
+        std::count_if(column.value.begin(), column.value.end(),
+                      [rule = rule_of(input)](double value) { return !rule.holds(value); }));
+}
+
 }  // namespace
+
+FieldColumn field_column(const std::string& written) {
+    FieldColumn column;
+    column.written = column.signal = written;
+    if (const auto* spelling = unit_spelling(written); spelling && spelling->unit) {
+        column.signal = written.substr(0, written.size() - spelling->suffix.size());
+        column.unit = *spelling->unit;
+        column.factor = spelling->factor;
+    }
+    return column;
+}
 
 FieldRecording read_field_csv(const std::string& path) {
     std::ifstream file(path);
@@ -64,13 +89,7 @@ FieldRecording read_field_csv(const std::string& path) {
     FieldRecording recording;
     recording.path = path;
     for (std::size_t i = 1; i < header.size(); ++i) {
-        FieldColumn column;
-        column.written = column.signal = header[i];
-        if (const auto* unit = unit_spelling(header[i])) {
-            column.signal = header[i].substr(0, header[i].size() - unit->suffix.size());
-            column.factor = unit->factor;
-        }
-        recording.columns.push_back(std::move(column));
+        recording.columns.push_back(field_column(header[i]));
     }
     for (int number = 2; std::getline(file, line); ++number) {
         if (line.empty() || line == "\r") continue;
@@ -103,6 +122,7 @@ FieldFit replay_field(const FieldRecording& recording, const plant::Model& model
         const FieldColumn* column;
         std::size_t input;
         bool hold;
+        double minimum, maximum;
     };
     struct Measured {
         const FieldColumn* column;
@@ -118,14 +138,21 @@ FieldFit replay_field(const FieldRecording& recording, const plant::Model& model
     std::vector<std::pair<std::string, double>> measured_speeds;
     for (const auto& column : recording.columns) {
         if (const int input = model.input(column.signal); input >= 0) {
-            const bool hold = signal_named(model.inputs(), column.signal)->unit == plant::Unit::one;
-            driven.push_back({&column, static_cast<std::size_t>(input), hold});
+            const plant::Signal& signal = *signal_named(model.inputs(), column.signal);
+            check_unit(recording, column, signal);
+            const bool hold = signal.unit == plant::Unit::one;
+            driven.push_back(
+                {&column, static_cast<std::size_t>(input), hold, signal.minimum, signal.maximum});
             result.driven.push_back(column.written);
+            if (const std::size_t rows = rows_beyond(signal, column))
+                result.limited.push_back({column.written, rows, rule_of(signal, column.factor).words()});
         } else if (const int output = model.output(column.signal); output >= 0) {
+            const plant::Signal& signal = *signal_named(model.outputs(), column.signal);
+            check_unit(recording, column, signal);
             measured.push_back({&column, static_cast<std::size_t>(output)});
             Fit fit;
             fit.written = column.written;
-            fit.unit = signal_named(model.outputs(), column.signal)->unit;
+            fit.unit = signal.unit;
             result.fits.push_back(fit);
             if (const std::string mass = mass_of(column.signal, model.description()); !mass.empty())
                 measured_speeds.emplace_back(mass, column.value.front());
@@ -143,7 +170,8 @@ FieldFit replay_field(const FieldRecording& recording, const plant::Model& model
     plant::Outputs outputs(model);
     plant::Scratch scratch(model);
     const auto drive = [&](double time) {
-        for (const auto& d : driven) inputs.value[d.input] = at(recording, *d.column, time, d.hold);
+        for (const auto& d : driven)
+            inputs.value[d.input] = std::clamp(at(recording, *d.column, time, d.hold), d.minimum, d.maximum);
     };
     drive(recording.time.front());
     // Measured speeds of masses that are rigidly coupled never agree to the bit: the first of them counts.

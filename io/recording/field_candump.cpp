@@ -92,6 +92,7 @@ FieldRecording read_field_candump(const std::string& path, const can::Mapping& o
         FieldColumn column;
         column.written = name + std::string(plant::suffix(samples.unit));
         column.signal = name;
+        column.unit = samples.unit;
         for (const double time : recording.time) column.value.push_back(between(samples, time));
         recording.columns.push_back(std::move(column));
     }

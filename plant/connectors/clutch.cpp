@@ -54,6 +54,9 @@ void check_parameters(const Check& check, const Clutch& c) {
         if (dry->falling > 1) check.fail("falling", "= " + number(dry->falling) + "; must be <= 1");
         check.positive("falling_speed", dry->falling_speed);
         if (!dry->factor_over_slip.empty()) check.rising("factor_over_slip", dry->factor_over_slip);
+        for (const auto& [slip, factor] : dry->factor_over_slip) {
+            if (factor < 0) check.fail("factor_over_slip", "= " + number(factor) + "; must be >= 0");
+        }
     } else {
         const auto& wet = std::get<WetPlates>(c.friction);
         if (wet.surfaces < 1) check.fail("surfaces", "= " + std::to_string(wet.surfaces) + "; must be >= 1");
@@ -85,6 +88,7 @@ void check_parameters(const Check& check, const Clutch& c) {
             check.fail("actuation", "by pressure needs wet plates: a dry pair has no piston area");
         }
         check.not_negative("dead_time", h->dead_time);
+        if (h->dead_time > 10) check.fail("dead_time", "= " + number(h->dead_time) + "; must be <= 10");
         check.positive("natural_frequency", h->natural_frequency);
         check.positive("damping_ratio", h->damping_ratio);
         check.positive("slew", h->slew);
@@ -144,6 +148,20 @@ void assemble(Assembly& assembly, const Clutch& c) {
                                         c.initially_locked});
 }
 
+namespace {
+
+// Commands under way stand in a delay line, one a step.
+void check_delay(const Clutch& c, double dead_time, const Description& machine, double h) {
+    constexpr double most_steps = 1e6;  // 8 MB
+    const double steps = dead_time * std::fmax(1, machine.oil ? machine.oil->cold_dead_time_factor : 1) / h;
+    if (!(steps <= most_steps))
+        Check(kind(c), c.name)
+            .fail("dead_time", "= " + number(dead_time) + "; must be at most " + number(most_steps) +
+                                   " steps of " + number(h) + " s in the coldest oil");
+}
+
+}  // namespace
+
 void add_pair_law(detail::ModelBuilder& builder, const Clutch& c) {
     using detail::LoadSource;
     const detail::ModelData& m = builder.model;
@@ -196,6 +214,7 @@ void add_pair_law(detail::ModelBuilder& builder, const Clutch& c) {
                                 hydraulic->maximum_pressure, "valve pressure wanted");
         law.valve_stuck = builder.flag(prefix + "valve_stuck", "fault: 1 holds the valve's outlet pressure");
         law.leak = builder.flag(prefix + "leak", "fault: share of the chamber pressure lost");
+        check_delay(c, hydraulic->dead_time, m.description, h);
         law.delay_slots =
             static_cast<int>(delay_slots(*hydraulic, m.description.oil ? &*m.description.oil : nullptr, h));
         builder.actuator(detail::hydraulic_slots + law.delay_slots);

@@ -10,7 +10,10 @@ namespace shiftrig::plant {
 
 void check_parameters(const Check& check, const BrixiusTyre& t) {
     check.positive("radius", t.radius);
-    check.positive("mobility_number", t.mobility_number);
+    // As the input environment.mobility_number has it.
+    if (!(t.mobility_number >= 1))
+        check.fail("mobility_number", "= " + number(t.mobility_number) + "; must be >= 1");
+    check.any("mobility_number", t.mobility_number);
     check.positive("relaxation_length", t.relaxation_length);
     check.not_negative("slip_damping_time", t.slip_damping_time);
     check.positive("weight", t.weight);

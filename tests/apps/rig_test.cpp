@@ -377,5 +377,38 @@ TEST(Rig, BusFaultsThatNoBusCarriesAreRefusedWithTheirPlace) {
               place + config + "two_mass.yaml has no stanza `can:`, and so no bus that they could act on");
 }
 
+std::string refusal_of(const std::string& text) {
+    try {
+        Rig rig(make_setup({}, inline_scenario(text)));
+        return "";
+    } catch (const io::InputError& error) {
+        const std::string path = config + "scenarios/inline.yaml:";
+        const std::string line = error.what();
+        return line.starts_with(path) ? line.substr(path.size()) : "without its file: " + line;
+    }
+}
+
+TEST(Rig, LeverBetweenTwoGearsIsRefused) {
+    EXPECT_EQ(refusal_of("duration_s: 1\ntimeline:\n  - {at_s: 0.5, driver.lever: 2.5}\n"),
+              "5:17: driver.lever = 2.5; must be a whole number");
+    EXPECT_EQ(refusal_of("duration_s: 1\ntimeline:\n  - {at_s: 0.5, over_s: 0.1, driver.lever: 2}\n"),
+              "5:30: driver.lever takes whole numbers; with it over_s must be 0");
+    EXPECT_EQ(refusal_of("duration_s: 1\nstart: {inputs: {driver.lever: 0.5}}\n"),
+              "4:18: driver.lever = 0.5; must be a whole number");
+    EXPECT_EQ(refusal_of("duration_s: 1\nstart: {inputs: {driver.lever: 250}}\n"),
+              "4:18: driver.lever = 250; must be within -9 and 99");
+    EXPECT_EQ(refusal_of("duration_s: 1\nstart: {inputs: {driver.lever: -1}}\n"), "");
+}
+
+TEST(Rig, StartThatTheMachineCannotHaveIsRefusedWithItsPlace) {
+    EXPECT_EQ(refusal_of("duration_s: 1\nstart:\n  locked: [Fc, F9]\n"),
+              "5: start \"F9\": locked is no clutch, brake or freewheel of the model");
+    EXPECT_EQ(refusal_of("duration_s: 1\nstart:\n  options: {range: Q}\n"),
+              "5: gear \"range\": no option \"Q\"; there are L, M, H");
+    EXPECT_EQ(refusal_of("duration_s: 1\nstart:\n  locked: [Fc]\n  speeds:\n    engine_rpm: 1800\n"
+                         "    clutch_disc_rpm: 900\n"),
+              "7: start \"engine\": speeds contradicts the other speeds through gears and locked devices");
+}
+
 }  // namespace
 }  // namespace shiftrig::rig

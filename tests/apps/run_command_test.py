@@ -25,6 +25,10 @@ def run(*arguments, program=SHIFTRIG, prefix=(), **options):
     return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=240, **options)
 
 
+def command(*arguments):
+    return subprocess.run([SHIFTRIG, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=240)
+
+
 def free(*arguments, scenario=SHIFT):
     done = run("--scenario", scenario, "--pace", "free", "--json", *arguments)
     assert done.returncode == 0, done.stderr
@@ -124,6 +128,36 @@ class BadInput(InAFolder):
         free("--can-log", log)
         self.assert_one_line(run("--scenario", SHIFT, "--can-replay", log, "--snapshot-at", "1", self.path("s.snap")),
                              "--snapshot-at: a run on --can-replay cannot go on from a snapshot$")
+
+    def test_a_fork_without_a_branch_that_ran_fails(self):
+        snapshot = self.path("s.snap")
+        free("--snapshot-at", "2.14", snapshot)
+        for values, code, told in (("-5,7000", 0, "refused: 1 of 2 branches"), ("-5", 2, "refused: 1 of 1 branches"),
+                                   ("1e-300", 1, "not finite: 1 of 1 branches")):
+            done = command("fork", snapshot, "--vary", "model.masses.vehicle.mass_kg=" + values)
+            self.assertEqual(done.returncode, code, done.stderr)
+            self.assertIn(told, done.stderr)
+        self.assert_one_line(command("fork", snapshot, "--vary", "clutch.F3.leak=0,2"),
+                             "--vary clutch.F3.leak = 2; must be within 0 and 1$")
+
+    def test_what_a_replay_holds_is_an_input_of_a_field_recording(self):
+        field, recording = self.path("field.csv"), self.path("r.lcmlog")
+        with open(field, "w") as file:
+            file.write("time_s,driver.throttle,mass.engine.speed_rpm\n0,0.5,1000\n0.05,7,1000\n0.1,0.5,1000\n")
+        replay = ("replay", field, "--model", CONFIG + "/tractor.yaml")
+        done = command(*replay)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr, field + ": driver.throttle must be within 0 and 1; limited in 1 of 3 rows\n")
+        for held, pattern in (
+                ("driver.thrrottle=0.5", "is no input of the model; nearest: driver.throttle$"),
+                ("mass.vehicle.speed=3", "is no input of the model"),
+                ("clutch.F2.pressure_command=18", "must be written with its unit: clutch.F2.pressure_command ends in _pa or _bar$"),
+                ("environment.draft=100", "= 100; must be within 0 and 10$"),
+                ("driver.throttle=1", "the recording or another --hold has it already$")):
+            self.assert_one_line(command(*replay, "--hold", held), "--hold " + held.split("=")[0] + ".*" + pattern)
+        free("--record", recording)
+        for option in (("--hold", "environment.draft=1"), ("--locked", "Fc"), ("--step", "0.1")):
+            self.assert_one_line(command("replay", recording, *option), option[0] + ": only of field recordings")
 
     def test_recording_that_cannot_be_written(self):
         self.assert_one_line(run("--scenario", SHIFT, "--record", "/nosuch/dir/x.lcmlog"), "/nosuch/dir/x.lcmlog")

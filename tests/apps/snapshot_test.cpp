@@ -6,10 +6,12 @@
 #include <atomic>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 
 #include "apps/rig/fork.h"
 #include "io/recording/snapshot.h"
+#include "io/yaml_document.h"
 #include "recorded_rig.h"
 #include "tests/io/synthetic_recording.h"
 
@@ -23,8 +25,8 @@ bool is_bookkeeping(const std::string& name) {
 }
 
 // plough_upshift up to `at`, written as a snapshot.
-void write_snapshot_at(const std::string& path, double at) {
-    Rig rig(setup_for("plough_upshift"));
+void write_snapshot_at(const std::string& path, double at, const Setup& setup = setup_for("plough_upshift")) {
+    Rig rig(setup);
     SnapshotTaker taker(rig, at);
     rt::LoopSettings loop;
     loop.pace = rt::Pace::free;
@@ -121,6 +123,40 @@ TEST(Snapshot, OfTheLastTicksOfASilenceKnowsOfIt) {
     expect_same_from("silent_controller", {3.998, 3.999, 4, 4.001}, 6);
 }
 
+// What happens to the calibration's file afterwards is nothing to a snapshot.
+TEST(Snapshot, HoldsItsCalibration) {
+    TemporaryFile file(".lcmlog"), calibration(".yaml");
+    const std::string shipped = io::read_text(shipped_calibration());
+    std::string text = shipped;
+    const std::string relative = "../can/tractor.yaml";
+    text.replace(text.find(relative), relative.size(), SHIFTRIG_SOURCE_DIR "/config/can/tractor.yaml");
+    std::ofstream(calibration.path) << text;
+    Choices choices;
+    choices.scenario = SHIFTRIG_SOURCE_DIR "/config/scenarios/plough_upshift.yaml";
+    choices.controller = "builtin:" + calibration.path;
+    const rig::Setup setup = make_setup(choices);
+    write_snapshot_at(file.path, 2.1, setup);
+    std::filesystem::remove(calibration.path);
+
+    const io::Manifest snapshot = io::read_snapshot(file.path);
+    Rig continued(setup_of(snapshot)), whole(setup);
+    resume(continued, snapshot);
+    while (whole.ticks() < continued.ticks()) whole.tick();
+    for (int tick = 0; tick < 500; ++tick) {
+        whole.tick();
+        continued.tick();
+        ASSERT_NO_FATAL_FAILURE(expect_same_tick(whole, continued));
+    }
+}
+
+TEST(Snapshot, WithoutItsCalibrationIsRefused) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 0.1);
+    io::Manifest snapshot = io::read_snapshot(file.path);
+    snapshot.facts.erase("calibration_text");
+    EXPECT_THROW(setup_of(snapshot), io::InputError);
+}
+
 TEST(Snapshot, OfAnotherMachineIsRefused) {
     TemporaryFile file(".lcmlog");
     write_snapshot_at(file.path, 0.5);
@@ -202,6 +238,52 @@ TEST(Fork, UnknownNameIsToldWithItsNeighbours) {
                                      "near: clutch.F3.leak"))
             << error.what();
     }
+}
+
+std::string fork_refusal(const std::string& path, const std::string& vary) {
+    try {
+        forked(path, {vary}, 1, 2);
+        return "";
+    } catch (const io::InputError& error) {
+        return error.what();
+    }
+}
+
+TEST(Fork, SignalBeyondItsRangeIsRefusedBeforeAnyBranch) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 0.1);
+    EXPECT_EQ(fork_refusal(file.path, "clutch.F3.leak=0,2"),
+              "--vary clutch.F3.leak = 2; must be within 0 and 1");
+    EXPECT_EQ(fork_refusal(file.path, "environment.grade_percent=0:2000"),
+              "--vary environment.grade_percent = 2000; must be within -1000 and 1000");
+    EXPECT_EQ(fork_refusal(file.path, "driver.throttle=+-60%"),
+              "--vary driver.throttle = 1.16496; must be within 0 and 1");
+    EXPECT_EQ(fork_refusal(file.path, "driver.lever=2,2.5"),
+              "--vary driver.lever = 2.5; must be a whole number");
+    EXPECT_EQ(fork_refusal(file.path, "driver.lever=2:3"),
+              "--vary driver.lever: takes whole numbers; write NAME=A,B,C");
+    EXPECT_EQ(fork_refusal(file.path, "mass.vehicle.speed_kmh=3"),
+              "--vary mass.vehicle.speed_kmh: this signal is not the user's to set");
+}
+
+TEST(Fork, BranchesThatCannotRunStandLast) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 2.14);
+    const auto branches = forked(file.path, {"model.masses.vehicle.mass_kg=-5,7000"}, 1);
+    ASSERT_EQ(branches.size(), 2u);
+    EXPECT_EQ(branches[0].error, "");
+    EXPECT_TRUE(branches[1].refused);
+    EXPECT_TRUE(branches[1].error.ends_with("mass_kg = -5; must be > 0")) << branches[1].error;
+}
+
+TEST(Fork, BranchThatDoesNotStayFiniteIsNotJudged) {
+    TemporaryFile file(".lcmlog");
+    write_snapshot_at(file.path, 2.14);
+    const auto branches = forked(file.path, {"model.masses.vehicle.mass_kg=1e-300"}, 1);
+    ASSERT_EQ(branches.size(), 1u);
+    EXPECT_FALSE(branches[0].refused);
+    EXPECT_FALSE(branches[0].shifted);
+    EXPECT_TRUE(branches[0].error.ends_with("ticks the state is not finite")) << branches[0].error;
 }
 
 TEST(Variation, IsReadAsWritten) {

@@ -2,7 +2,9 @@
 // whole bench (rig tests).
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <numbers>
 
 #include "apps/tcu/controller.h"
@@ -270,6 +272,26 @@ TEST(Calibration, WrongKeyIsNamedWithItsPlace) {
         FAIL() << "was read";
     } catch (const io::InputError& error) {
         EXPECT_EQ(std::string(error.what()), path + ":2:1: machines is not a known key; nearest: machine");
+    }
+}
+
+TEST(Calibration, TouchPressureBeyondTheFullOneIsRefused) {
+    std::ifstream shipped(SHIFTRIG_SOURCE_DIR "/config/calibration/tractor.yaml");
+    std::string text{std::istreambuf_iterator<char>(shipped), {}};
+    const auto at = text.find("touch_pressure_bar:");
+    ASSERT_NE(at, std::string::npos);
+    text.replace(at, text.find('\n', at) - at, "touch_pressure_bar: 40");
+    const std::string path = testing::TempDir() + "touch_calibration.yaml";
+    std::ofstream(path) << text;
+    try {
+        read_calibration(path);
+        FAIL() << "was read";
+    } catch (const io::InputError& error) {
+        const auto line = std::to_string(
+            1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+        EXPECT_EQ(
+            std::string(error.what()),
+            path + ":" + line + ":3: clutch.touch_pressure_bar = 40; must be at most full_pressure_bar");
     }
 }
 

@@ -513,6 +513,19 @@ TEST_F(Configuration, WhatIsWrongIsNamedWithItsPlace) {
     EXPECT_EQ(error_of("  Command: [\n"), "small.yaml:5:1: end of sequence flow not found");
 }
 
+// The last one would count, or none of them.
+TEST_F(Configuration, AKeyGivenTwiceIsRefused) {
+    EXPECT_EQ(error_of("  Command: {timeout_ms: 3}\n  Command: {timeout_ms: 4}\n"),
+              "small.yaml:5:3: messages: \"Command\" is given twice");
+    EXPECT_EQ(error_of("  Command:\n    timeout_ms: 3\n    timeout_ms: 4\n"),
+              "small.yaml:6:5: message Command: \"timeout_ms\" is given twice");
+    EXPECT_EQ(
+        error_of(
+            "  Speeds:\n    signals:\n      Wheels: {signal: mass.engine.speed, is: 1, when: {Wheels: [2]}, "
+            "otherwise: 0}\n"),
+        "small.yaml:6:56: Speeds.Wheels: is and when exclude each other");
+}
+
 // What is written as another kind of thing would be read as nothing.
 TEST_F(Configuration, AListAMapAndAWordAreToldApart) {
     EXPECT_EQ(error_of("  [Command]\n"), "small.yaml:4:3: messages: keys and values are wanted");

@@ -357,5 +357,37 @@ TEST(ModelFile, AMissingFileIsNamed) {
     }
 }
 
+TEST(ModelFile, ADeadTimeFitsIntoMemory) {
+    EXPECT_EQ(refusal(two_masses + replaced(wet_clutch, "dead_time_s: 0.015", "dead_time_s: 1e300")),
+              "m.yaml:21:7: clutch \"F2\": hydraulic.dead_time_s = 1e300; must be within 0 and 10");
+    const auto file =
+        parse_model(two_masses + replaced(wet_clutch, "dead_time_s: 0.015", "dead_time_s: 10"), "m.yaml");
+    plant::BuildOptions options;
+    EXPECT_NO_THROW(build_model(file, options));
+    options.step_size = 1e-8;  // 100 kHz, 1000 substeps
+    try {
+        build_model(file, options);
+        FAIL() << "was built";
+    } catch (const InputError& error) {
+        EXPECT_STREQ(error.what(),
+                     "m.yaml:21:7: clutch \"F2\": hydraulic.dead_time_s = 10; must be at most "
+                     "1000000 steps of 1e-08 s in the coldest oil");
+    }
+}
+
+TEST(ModelFile, FrictionDoesNotDrive) {
+    const std::string dry =
+        "clutches:\n"
+        "  C:\n"
+        "    a: left\n"
+        "    b: right\n"
+        "    dry: {sliding_capacity_nm: 100, static_ratio: 1.2,\n"
+        "          factor_over_slip_rad_s: [[0, 1], [10, 0]]}\n"  // 10
+        "    direct: {}\n";
+    EXPECT_EQ(refusal(two_masses + dry), "");
+    EXPECT_EQ(refusal(two_masses + replaced(dry, "[10, 0]", "[10, -0.5]")),
+              "m.yaml:10:44: clutch \"C\": dry.factor_over_slip_rad_s = [10, -0.5]; y must be at least 0");
+}
+
 }  // namespace
 }  // namespace shiftrig::io

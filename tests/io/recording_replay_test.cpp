@@ -296,6 +296,53 @@ TEST(FieldReplay, WrongDataIsNamedWithItsLine) {
     EXPECT_EQ(error("time_s,a\n0,1\n"), ": has fewer than two rows");
 }
 
+TEST(FieldReplay, AColumnInAnotherUnitIsRefused) {
+    TemporaryFile field(".csv");
+    const plant::Model model = build_model(read_model(SHIFTRIG_SOURCE_DIR "/config/tractor.yaml"));
+    const auto error = [&](const std::string& columns) {
+        write_file(field.path, "time_s," + columns + "\n0,1,1\n0.01,1,1\n");
+        try {
+            replay_field(read_field_csv(field.path), model, {});
+        } catch (const InputError& e) {
+            return std::string(e.what()).substr(field.path.size());
+        }
+        return std::string("(no error)");
+    };
+    const std::string speed = "mass.engine.speed_rpm";
+    EXPECT_EQ(error("driver.throttle," + speed), "(no error)");
+    EXPECT_EQ(
+        error("clutch.F2.pressure_command_rpm," + speed),
+        ":1: clutch.F2.pressure_command_rpm must be written with its unit: clutch.F2.pressure_command ends "
+        "in _pa or _bar");
+    EXPECT_EQ(
+        error("clutch.Fc.release_command_kg," + speed),
+        ":1: clutch.Fc.release_command_kg must be written with its unit: clutch.Fc.release_command ends in "
+        "no suffix or _percent");
+    EXPECT_EQ(
+        error("driver.throttle,mass.engine.speed_bar"),
+        ":1: mass.engine.speed_bar must be written with its unit: mass.engine.speed ends in _rad_s or _rpm");
+    EXPECT_EQ(
+        error("driver.throttle,mass.engine.speed"),
+        ":1: mass.engine.speed must be written with its unit: mass.engine.speed ends in _rad_s or _rpm");
+}
+
+TEST(FieldReplay, InputsBeyondTheirRangeAreLimitedAndCounted) {
+    TemporaryFile field(".csv");
+    const plant::Model model = build_model(read_model(SHIFTRIG_SOURCE_DIR "/config/tractor.yaml"));
+    const auto fit = [&](const char* rows) {
+        write_file(field.path, std::string("time_s,driver.throttle_percent,mass.engine.speed_rpm\n") + rows);
+        return replay_field(read_field_csv(field.path), model, {});
+    };
+    const FieldFit beyond = fit("0,100,900\n0.1,130,950\n0.2,110,950\n0.3,100,950\n");
+    ASSERT_EQ(beyond.limited.size(), 1u);
+    EXPECT_EQ(beyond.limited[0].written, "driver.throttle_percent");
+    EXPECT_EQ(beyond.limited[0].rows, 2u);
+    EXPECT_EQ(beyond.limited[0].rule, "must be within 0 and 100");
+    const FieldFit within = fit("0,100,900\n0.1,100,950\n0.2,100,950\n0.3,100,950\n");
+    EXPECT_TRUE(within.limited.empty());
+    EXPECT_EQ(within.fits.at(0).rms, beyond.fits.at(0).rms);
+}
+
 TEST(Csv, NumbersReadBackToTheBit) {
     TemporaryFile file(".csv");
     const std::vector<double> values = {0.1, -0.0, 1.0 / 3, 5e-324, 1.7976931348623157e308};

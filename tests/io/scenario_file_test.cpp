@@ -25,16 +25,16 @@ std::string refusal(const std::string& text) {
 
 SignalTable some_signals() {
     SignalTable table;
-    const auto add = [&table](const char* name, plant::Unit unit) {
-        plant::Signal signal;
-        signal.name = name;
-        signal.unit = unit;
-        table.add(signal);
+    const auto add = [&table](const char* name, plant::Unit unit, double minimum = -1e300,
+                              double maximum = 1e300) {
+        table.add({name, unit, 0, minimum, maximum, ""});
     };
-    add("driver.throttle", plant::Unit::one);
+    add("driver.throttle", plant::Unit::one, 0, 1);
+    add("environment.grade", plant::Unit::one, -10, 10);
+    add("source.motor.torque", plant::Unit::newton_metre);
     add("mass.engine.speed", plant::Unit::radian_per_second);
     add("mass.vehicle.speed", plant::Unit::metre_per_second);
-    add("clutch.F2.pressure_command", plant::Unit::pascal);
+    add("clutch.F2.pressure_command", plant::Unit::pascal, 0, 20e5);
     return table;
 }
 
@@ -111,6 +111,7 @@ TEST(ScenarioFile, ExpectationsAreReadInSi) {
             .expect;
     ASSERT_EQ(expect.shifts.size(), 2u);
     EXPECT_TRUE(expect.shifts_given);
+    EXPECT_EQ(parse_scenario(head + "expect:\n  no_shifts: true\n", "s.yaml").expect.no_shifts_line, 4);
     EXPECT_EQ(expect.shifts[1].shift, "F3->F4");
     EXPECT_FALSE(expect.shifts[1].completed);
     EXPECT_EQ(expect.metrics.at(0).maximum, 0.6);
@@ -162,6 +163,27 @@ TEST(ScenarioFile, ASignalWithoutItsUnitIsRefused) {
     EXPECT_EQ(signal_refusal("expect: {final: [{signal: mass.vehicle.speed_rpm, min: 1}]}\n"),
               "s.yaml:3:27: mass.vehicle.speed_rpm must be written with its unit: mass.vehicle.speed ends in "
               "_m_s or _kmh");
+}
+
+// Nothing is limited in silence: 73 is a percentage that somebody took for a share.
+TEST(ScenarioFile, AValueBeyondTheSignalsRangeIsRefusedInTheUnitWritten) {
+    EXPECT_EQ(signal_refusal("start: {inputs: {driver.throttle: 73}}\n"),
+              "s.yaml:3:18: driver.throttle = 73; must be within 0 and 1");
+    EXPECT_EQ(signal_refusal("start: {inputs: {driver.throttle_percent: 73}}\n"), "");
+    EXPECT_EQ(signal_refusal("timeline: [{at_s: 1, environment.grade_percent: 1e300}]\n"),
+              "s.yaml:3:22: environment.grade_percent = 1e+300; must be within -1000 and 1000");
+    EXPECT_EQ(signal_refusal("timeline: [{at_s: 1, clutch.F2.pressure_command_bar: 20.5}]\n"),
+              "s.yaml:3:22: clutch.F2.pressure_command_bar = 20.5; must be within 0 and 20");
+    EXPECT_EQ(signal_refusal("timeline: [{at_s: 1, clutch.F2.pressure_command_bar: 20}]\n"), "");
+    EXPECT_EQ(signal_refusal("timeline: [{at_s: 1, source.motor.torque_nm: -1e9}]\n"), "");
+}
+
+TEST(ScenarioFile, AMomentThatDoesNothingIsRefused) {
+    EXPECT_EQ(refusal(head + "timeline:\n  - {at_s: 0.5, note: nothing}\n"),
+              "config/scenarios/s.yaml:4:5: timeline: sets no signal");
+    EXPECT_EQ(refusal(head + "timeline:\n  - {at_s: 6, driver.lever: 3}\n"),
+              "config/scenarios/s.yaml:4:5: timeline: at_s = 6; must be before the end, duration_s = 6");
+    EXPECT_EQ(refusal(head + "timeline:\n  - {at_s: 5.999, over_s: 3, driver.throttle: 1}\n"), "");
 }
 
 }  // namespace
