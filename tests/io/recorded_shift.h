@@ -14,6 +14,7 @@ struct ShiftOptions {
     plant::KernelKind kernel = plant::KernelKind::portable;
     double handover_pressure = 12e5;  // of F3 [Pa]
     bool starve_the_log = false;      // from tick 400 to 449 a queue of 4 ticks is not waited for
+    bool stop_at_a_loss = false;      // the tick that finds the queue full is the last
     RecordingOptions recording;
 };
 
@@ -77,8 +78,10 @@ inline RecordingSummary record_shift(const std::string& path, const ShiftOptions
         r.events = events;
         r.certificate = outputs.certificate;
         r.state = state.bytes();
-        if (!options.starve_the_log || tick < 400 || tick >= 450) writer.wait_for_room();
+        const bool waits = tick >= 450 && !options.stop_at_a_loss;
+        if (!options.starve_the_log || tick < 400 || waits) writer.wait_for_room();
         writer.tick(r);
+        if (options.stop_at_a_loss && writer.lost() > 0) break;
     }
     return writer.end();
 }
