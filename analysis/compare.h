@@ -27,12 +27,13 @@ struct Difference {
     Kind kind{};
     std::string run, shift;  // "plough_upshift", "F2->F3"
     std::string metric;      // full name; "completed" where completion changed; empty: the shift as a whole
-    double before = 0, after = 0;
-    std::string text() const;  // `plough_upshift F2->F3: duration_s 0.412 → 0.471 (+14.3 %), worse`
+    double before = 0, after = 0;  // NaN: no value
+    std::string text() const;      // `plough_upshift F2->F3: duration_s 0.412 → 0.471 (+14.3 %), worse`
 };
 
-// What differs by more than the tolerance, in completion and in every metric that has a limit (for all of them
-// less is better). Worse first.
+// What differs by more than the tolerance, in completion and in every metric that has a limit and that one of the
+// shifts has (for all of them less is better). A clutch that one of them does not tell took no heat and did not slip
+// there; a value that is lost is worse. Worse first.
 std::vector<Difference> compare(const nlohmann::json& before, const nlohmann::json& after,
                                 const Limits& limits, const Tolerance& tolerance = {});
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -74,6 +75,40 @@ TEST(Compare, FromNothingToSomethingCounts) {
     const auto found = compare(two_runs(), after, default_limits());
     ASSERT_EQ(found.size(), 1u);
     EXPECT_EQ(found[0].text(), "plough F2->F3: slip_time_s.Fc 0 → 0.05, worse");
+}
+
+// The scorecard tells clutches beside the shift's own only once they take heat: what it does not tell took none.
+TEST(Compare, AClutchThatBeginsToBurnIsWorseAndOneThatCeasesToIsBetter) {
+    json after = two_runs();
+    after["plough"][0]["clutch_energy_j"]["Fc"] = 90000.0;
+    after["plough"][0]["clutch_peak_power_w"]["Fc"] = 70000.0;
+    after["plough"][0]["clutch_temperature_degc"]["Fc"] = 400.0;  // of which no value before is known
+    const auto found = compare(two_runs(), after, default_limits());
+    ASSERT_EQ(found.size(), 2u);
+    EXPECT_EQ(found[0].text(), "plough F2->F3: clutch_energy_j.Fc 0 → 9e+04, worse");
+    EXPECT_EQ(found[1].text(), "plough F2->F3: clutch_peak_power_w.Fc 0 → 7e+04, worse");
+    const auto back = compare(after, two_runs(), default_limits());
+    ASSERT_EQ(back.size(), 2u);
+    EXPECT_EQ(back[0].text(), "plough F2->F3: clutch_energy_j.Fc 9e+04 → 0 (-100.0 %), better");
+}
+
+TEST(Compare, AMetricWhoseValueIsLostIsWorse) {
+    for (const json& lost : {json(), json(std::nan(""))}) {
+        json after = two_runs();
+        after["plough"][0]["peak_jerk_m_s3"] = lost;
+        after["plough"][0]["clutch_energy_j"]["F3"] = lost;
+        const auto found = compare(two_runs(), after, default_limits());
+        ASSERT_EQ(found.size(), 2u);
+        EXPECT_EQ(found[0].text(), "plough F2->F3: clutch_energy_j.F3 3100 → no value, worse");
+        EXPECT_EQ(found[1].text(), "plough F2->F3: peak_jerk_m_s3 8 → no value, worse");
+        const auto back = compare(after, two_runs(), default_limits());
+        ASSERT_EQ(back.size(), 2u);
+        EXPECT_EQ(back[1].text(), "plough F2->F3: peak_jerk_m_s3 no value → 8, better");
+        EXPECT_TRUE(compare(after, after, default_limits()).empty());
+    }
+    json after = two_runs();
+    after["plough"][0].erase("peak_jerk_m_s3");
+    EXPECT_EQ(compare(two_runs(), after, default_limits()).size(), 1u);
 }
 
 TEST(Compare, LostCompletionAndLostShiftsComeFirst) {
