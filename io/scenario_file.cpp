@@ -1,10 +1,12 @@
 #include "io/scenario_file.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 
 #include "io/field_reader.h"
 #include "io/field_schema.h"
+#include "io/nearest.h"
 #include "io/scenario_fields.h"
 #include "io/units.h"
 
@@ -20,7 +22,24 @@ std::vector<TimedSetting> by_time(const std::vector<TimelineText>& timeline) {
     return result;
 }
 
-Expectations expectations(const std::string& path, const ExpectText& text) {
+std::string number(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%g", value);
+    return text;
+}
+
+// An event is looked for in its window: one without time in it would forbid nothing.
+void check_window(const std::string& path, const ExpectedEvent& event, double duration) {
+    const auto refuse = [&](double from, const std::string& rule) {
+        throw InputError(path, event.line, event.column,
+                         "expect: " + event.kind + " from_s = " + number(from) + "; must be below " + rule);
+    };
+    const auto [from, until] = event.window;
+    if (!(from < until)) refuse(from, "until_s = " + number(until));
+    if (!(from < duration)) refuse(from, "duration_s = " + number(duration));
+}
+
+Expectations expectations(const std::string& path, const ExpectText& text, double duration) {
     Expectations expect;
     expect.shifts_given = text.no_shifts || !text.shifts.empty();
     for (const auto& shift : text.shifts) {
@@ -40,9 +59,11 @@ Expectations expectations(const std::string& path, const ExpectText& text) {
         expect.signals.push_back(
             {last.quantity, {rules::unbounded, rules::unbounded}, last.minimum, last.maximum});
 
-    for (const auto& event : expect.events)
+    for (const auto& event : expect.events) {
         if (event.kind.empty())
             throw InputError(path, event.line, event.column, "expect: the event's kind is missing");
+        check_window(path, event, duration);
+    }
     for (auto& bound : expect.signals) {
         if (bound.minimum == -rules::unbounded && bound.maximum == rules::unbounded)
             throw InputError(path, bound.quantity.line, bound.quantity.column,
@@ -89,7 +110,7 @@ ScenarioFile parse_scenario(const std::string& text, const std::string& path) {
     scenario.name = place.stem().string();
     scenario.model_path = (place.parent_path() / written.model).lexically_normal().string();
     scenario.timeline = by_time(written.timeline);
-    scenario.expect = expectations(path, written.expect);
+    scenario.expect = expectations(path, written.expect, scenario.duration);
     return scenario;
 }
 
@@ -106,6 +127,19 @@ void check_signals(const ScenarioFile& scenario, const SignalTable& signals) {
         check(scenario, moment.setting.quantity, moment.setting.quantity.signal, signals);
     for (const auto& bound : scenario.expect.signals)
         check(scenario, bound.quantity, bound.quantity.signal, signals);
+}
+
+void check_devices(const ScenarioFile& scenario, const std::vector<std::string>& devices) {
+    for (const auto& event : scenario.expect.events) {
+        const auto refuse = [&](const std::string& what) {
+            throw InputError(scenario.path, event.line, event.column, "expect: " + event.kind + what);
+        };
+        if (event.device.empty()) continue;
+        if (event.kind == "safe_command") refuse(" is of no device: it is the bench's own");
+        if (std::find(devices.begin(), devices.end(), event.device) == devices.end())
+            refuse(" of " + event.device + ": no device of this model has events by that name" +
+                   nearest_hint(event.device, devices));
+    }
 }
 
 nlohmann::ordered_json scenario_schema() {

@@ -86,6 +86,12 @@ check("a run whose events did not all fit cannot be judged",
       crowd.returncode == 2 and "crowd.yaml: the run's events do not fit the memory: 44 too many\n" in crowd.stdout,
       crowd.stdout + crowd.stderr)
 
+misspelt = run(scenario("misspelt", only_must_not + "    - {kind: lock, device: F22}\n"))
+check("a device that the model does not have is one line and exit code 2, not kept by every run",
+      misspelt.returncode == 2 and re.search(r"misspelt\.yaml:\d+:7: expect: lock of F22: no device of this model has "
+                                             r"events by that name; nearest: F2\n", misspelt.stdout),
+      misspelt.stdout + misspelt.stderr)
+
 recordings = os.path.join(folder, "recordings")
 os.mkdir(recordings)
 lost = run(shift, "--record", recordings, restore_signals=False,  # SIGXFSZ stays ignored: the write fails instead
