@@ -3,65 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
-#include "analysis/load_run.h"
-#include "analysis/scorecard.h"
-#include "io/input_error.h"
-#include "io/recording/reader.h"
-#include "io/recording/rebuild.h"
-
 namespace shiftrig::analysis {
 
 namespace {
 
-namespace fs = std::filesystem;
 using nlohmann::json;
-
-std::string stem(const fs::path& path) {
-    const std::string file = path.filename().string();
-    return file.substr(0, file.find('.'));
-}
-
-// Adds the runs of one JSON document to `results`.
-void take(const json& document, const std::string& name, const std::string& path, json& results) {
-    if (document.is_array()) {
-        for (std::size_t i = 0; i < document.size(); ++i)
-            take(document[i], name + "#" + std::to_string(i + 1), path, results);
-    } else if (document.is_object() && document.contains("shifts") && document["shifts"].is_array()) {
-        std::string own = name;
-        for (const char* key : {"name", "scenario"}) {
-            if (document.contains(key) && document[key].is_string())
-                own = stem(document[key].get<std::string>());
-        }
-        results[own] = document["shifts"];
-    } else if (document.is_object() && document.contains("runs")) {
-        take(document["runs"], name, path, results);
-    } else if (document.is_object() && document.contains("scenarios")) {
-        take(document["scenarios"], name, path, results);
-    } else {
-        throw io::InputError(
-            path + ": no \"shifts\" in it; must be a result of run --json or test --json, or a recording");
-    }
-}
-
-void read_file(const fs::path& path, const Limits& limits, json& results) {
-    if (io::looks_like_recording(path.string())) {
-        const plant::Description machine =
-            io::recorded_model_file(io::RecordingReader(path.string()).manifest()).description;
-        results[stem(path)] = to_json(score(load_run(path.string(), scorecard_signals(machine)), limits));
-        return;
-    }
-    std::ifstream file(path);
-    const json document = json::parse(file, nullptr, false);
-    if (document.is_discarded()) throw io::InputError(path.string() + ": neither a recording nor JSON");
-    take(document, stem(path), path.string(), results);
-}
 
 // A metric's value by full name ("clutch_energy_j.F3"); NaN where the shift has none. Nothing where it cannot be
 // compared: the temperature of a clutch that is not told.
@@ -171,27 +122,6 @@ class Comparison {
 };
 
 }  // namespace
-
-json read_results(const std::string& path, const Limits& limits) {
-    json results = json::object();
-    std::error_code error;
-    if (!fs::is_directory(path, error)) {
-        if (!fs::exists(path, error)) throw io::InputError(path + ": no such file");
-        read_file(path, limits, results);
-        return results;
-    }
-    std::vector<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(path)) {
-        const std::string file = entry.path().filename().string();
-        const bool wanted = file.find(".lcmlog") != std::string::npos || entry.path().extension() == ".json";
-        if (entry.is_regular_file() && wanted) files.push_back(entry.path());
-    }
-    if (files.empty())
-        throw io::InputError(path + ": no recording (*.lcmlog, *.lcmlog.zst) and no *.json in it");
-    std::sort(files.begin(), files.end());
-    for (const fs::path& file : files) read_file(file, limits, results);
-    return results;
-}
 
 std::string Difference::text() const {
     const std::string head = run + " " + shift + ": ";

@@ -1,7 +1,6 @@
 // Two result sets side by side: which shift of which run got worse or better, in what, and by how much.
 //
-// A result set is what one build, one calibration or one recording says of some runs. Shifts are matched by
-// run, label and order (the second F2->F3 of a run with the second); where both sets hold a single run, the
+// Shifts are matched by run, label and order (the second F2->F3 of a run with the second); where both sets hold a single run, the
 // runs are matched whatever their names.
 #pragma once
 
@@ -12,11 +11,6 @@
 #include "analysis/limits.h"
 
 namespace shiftrig::analysis {
-
-// Reads a result set: a recording; a JSON file of `shiftrig run --json` or `shiftrig test --json` (an object with
-// "shifts", or an array of such objects, or an object with them in "runs"); or a folder of such files.
-// Result: {run name: shifts array}. Throws InputError or RecordingError.
-nlohmann::json read_results(const std::string& path, const Limits& limits);
 
 struct Tolerance {
     double relative = 0.02;  // of the value before, or of a tenth of the limit for `good` if that is more

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "analysis/result_set.h"
 #include "io/input_error.h"
 
 namespace shiftrig::analysis {
@@ -164,6 +165,36 @@ TEST_F(ResultFiles, AreReadAloneInListsAndInFolders) {
                               .dump());
     EXPECT_EQ(read_results(list, default_limits()), (json{{"a", shifts}, {"b", json::array()}}));
     EXPECT_EQ(read_results(folder.string(), default_limits()).size(), 3u);
+}
+
+TEST_F(ResultFiles, KeepDotsInTheirNamesAndRefuseANameThatIsTaken) {
+    const std::string shifts = json{{"shifts", two_runs()["road"]}}.dump();
+    file("shift.v1.json", shifts);
+    file("shift.v2.json", shifts);
+    const json results = read_results(folder.string(), default_limits());
+    EXPECT_TRUE(results.contains("shift.v1"));
+    EXPECT_TRUE(results.contains("shift.v2"));
+    file("z.json", R"({"scenario": "b/shift.v1.yaml", "shifts": []})");
+    EXPECT_EQ(refusal(folder.string()), "z.json: run \"shift.v1\" is there already, from " +
+                                            (folder / "shift.v1.json").string() +
+                                            "; runs are told apart by name");
+}
+
+TEST_F(ResultFiles, ThatAreIllTypedAreNamedWithFileRunShiftKeyAndRule) {
+    const auto refused = [this](const std::string& shift) {
+        return refusal(file("r.json", "{\"shifts\": [" + shift + "]}"));
+    };
+    const std::string place = "r.json: run \"r\", shift 1: ";
+    EXPECT_EQ(refused(R"({"from": 3, "to": "F4"})"), place + "from = 3; must be a word");
+    EXPECT_EQ(refused(R"({"from": "F3"})"), place + "to is missing");
+    EXPECT_EQ(refused("7"), place + "it = 7; must be an object");
+    EXPECT_EQ(refused(R"({"from": "F3", "to": "F4", "completed": 1})"),
+              place + "completed = 1; must be true or false");
+    EXPECT_EQ(refused(R"({"from": "F3", "to": "F4", "duration_s": "fast"})"),
+              place + "duration_s = \"fast\"; must be a number or null");
+    EXPECT_EQ(refused(R"({"from": "F3", "to": "F4", "clutch_energy_j": {"F3": []}})"),
+              place + "clutch_energy_j.F3 = []; must be a number or null");
+    EXPECT_EQ(refused(R"({"from": "F3", "to": "F4", "clutch_energy_j": {"F3": null}})"), "accepted");
 }
 
 TEST_F(ResultFiles, WrongOnesAreRefusedInOneLine) {
