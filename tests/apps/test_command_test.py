@@ -5,6 +5,7 @@ All pass with the reference controller; with the bad calibration shipped beside 
 runs that gave up, are not finite or could not be kept whole fail whatever was expected of them; the JUnit file
 parses and agrees; a broken expectation is one line with scenario, time, signal, expected, found."""
 import glob
+import json
 import os
 import re
 import resource
@@ -94,6 +95,37 @@ check("a device that the model does not have is one line and exit code 2, not ke
 
 recordings = os.path.join(folder, "recordings")
 os.mkdir(recordings)
+os.mkdir(os.path.join(folder, "b"))
+other = scenario("b/shift", only_must_not)
+same_name = run(shift, other, "--record", recordings, "--jobs", "2")
+check("two scenarios that would be recorded in one file are refused",
+      same_name.returncode == 2 and same_name.stderr ==
+      f"shiftrig: --record: scenarios {shift} and {other} would both be recorded as shift.lcmlog\n"
+      and not os.listdir(recordings), same_name.stdout + same_name.stderr)
+check("without --record they are run", run(shift, other).returncode == 0)
+respelt = os.path.join(folder, ".", "shift.yaml")
+twice = run(shift, respelt)
+check("one scenario under two spellings is one given twice",
+      twice.returncode == 2 and twice.stderr == f"shiftrig: scenario {respelt} is given twice\n", twice.stdout + twice.stderr)
+
+good, worse = os.path.join(folder, "good.json"), os.path.join(folder, "bad.json")
+for path, words, status in ((good, [], 0), (worse, ["--controller", "builtin:config/calibration/bad.yaml"], 1)):
+    tested = run("config/scenarios/plough_upshift.yaml", "config/scenarios/creep.yaml", "--json", *words)
+    check("--json ends as without it", tested.returncode == status, tested.stdout + tested.stderr)
+    with open(path, "w") as file:
+        file.write(tested.stdout)
+first = json.load(open(good))["runs"][0]
+check("--json says of each scenario whether it passed, and of each shift the scorecard",
+      first["scenario"] == "config/scenarios/plough_upshift.yaml" and first["passed"] and first["failures"] == []
+      and [(s["from"], s["to"], s["verdicts"]["duration_s"]) for s in first["shifts"]] == [("F2", "F3", "good")], first)
+check("and why it failed", not json.load(open(worse))["runs"][0]["passed"] and json.load(open(worse))["runs"][0]["failures"])
+compared = subprocess.run([shiftrig, "compare", good, worse], capture_output=True, text=True)
+check("compare reads both and finds what got worse",
+      compared.returncode == 1 and re.search(r"^plough_upshift F2->F3: .*, worse$", compared.stdout, re.M),
+      compared.stdout + compared.stderr)
+check("and nothing where nothing changed",
+      subprocess.run([shiftrig, "compare", good, good], capture_output=True).returncode == 0)
+
 lost = run(shift, "--record", recordings, restore_signals=False,  # SIGXFSZ stays ignored: the write fails instead
            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, 1 << 20)))
 check("a recording that is cut short by its disk is told and fails",
