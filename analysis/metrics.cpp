@@ -270,12 +270,8 @@ class Meter {
 
     // Pairs that are there to hold, not to select a gear or to brake: the main clutch, a Coulomb wheel contact.
     bool is_holding_pair(const plant::Clutch& pair) const {
-        for (const plant::GearPath& path : run_.machine.gear_paths) {
-            const bool closed =
-                std::find(path.closed.begin(), path.closed.end(), pair.name) != path.closed.end();
-            if (!closed && pair.radius == 0) return false;
-        }
-        return true;
+        const auto& common = gears_.front().common;  // the same of every gear
+        return pair.radius != 0 || std::find(common.begin(), common.end(), pair.name) != common.end();
     }
     // Clutches of this shift always; others only if they took heat in it, other than the drag of open plates.
     bool worth_telling(const std::string& name) const {

@@ -136,6 +136,18 @@ TEST(Metrics, SlipTimeOfThePairsThatShouldHold) {
     EXPECT_EQ(only_shift(synthetic).find("slip_time_s.B"), nullptr);
 }
 
+TEST(Metrics, WhatSelectsTheOnlyGearIsNoPairThatShouldHold) {
+    SyntheticRun synthetic = driving_in_a();
+    synthetic.run.machine.gear_paths.resize(1);
+    synthetic.set("clutch.A.engagement", step(5, 0, 1)).set("clutch.A.state", step(5.5, slipping, locked));
+    synthetic.set_input_speed(ramp(5, 5.5, 200, 120));
+    const ShiftScore shift = only_shift(synthetic);
+    EXPECT_EQ(shift.shift.label(), "N->A");
+    EXPECT_EQ(shift.find("slip_time_s.A"), nullptr);
+    EXPECT_EQ(shift.find("slip_time_s.Fc"), nullptr);
+    EXPECT_NE(shift.find("slip_time_s.Fw"), nullptr);
+}
+
 TEST(Metrics, FillTimeIsFromTheCommandToTheKissPoint) {
     EXPECT_NEAR(metric(upshift(), "fill_time_s"), 0.1, 1e-9);
 }
