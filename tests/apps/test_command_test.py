@@ -61,6 +61,11 @@ def scenario(name, text):
     return path
 
 
+# What the reader of the documentation tries first.
+example = re.search(r"(?s)```yaml\n(.*?)```", open("docs/scenario-files.md").read())[1]
+tried = run(scenario("example", example.replace("../tractor.yaml", os.path.abspath("config/tractor.yaml"))))
+check("the example of docs/scenario-files.md holds", tried.returncode == 0, tried.stdout + tried.stderr)
+
 # A `must_not` alone is kept by every run that does nothing: by one that gave up and by one that is not finite.
 shift = open("config/scenarios/plough_upshift.yaml").read().replace("../tractor.yaml", os.path.abspath("config/tractor.yaml"))
 only_must_not = re.sub(r"(?s)^expect:.*", "expect:\n  must_not:\n    - {kind: engine_stalls}\n", shift, flags=re.M)
