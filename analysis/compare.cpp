@@ -3,86 +3,47 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
-
-#include "analysis/load_run.h"
-#include "analysis/scorecard.h"
-#include "io/input_error.h"
-#include "io/recording/reader.h"
-#include "io/recording/rebuild.h"
+#include <set>
 
 namespace shiftrig::analysis {
 
 namespace {
 
-namespace fs = std::filesystem;
 using nlohmann::json;
 
-std::string stem(const fs::path& path) {
-    const std::string file = path.filename().string();
-    return file.substr(0, file.find('.'));
-}
-
-// Adds the runs of one JSON document to `results`.
-void take(const json& document, const std::string& name, const std::string& path, json& results) {
-    if (document.is_array()) {
-        for (std::size_t i = 0; i < document.size(); ++i)
-            take(document[i], name + "#" + std::to_string(i + 1), path, results);
-    } else if (document.is_object() && document.contains("shifts") && document["shifts"].is_array()) {
-        std::string own = name;
-        for (const char* key : {"name", "scenario"}) {
-            if (document.contains(key) && document[key].is_string())
-                own = stem(document[key].get<std::string>());
-        }
-        results[own] = document["shifts"];
-    } else if (document.is_object() && document.contains("runs")) {
-        take(document["runs"], name, path, results);
-    } else if (document.is_object() && document.contains("scenarios")) {
-        take(document["scenarios"], name, path, results);
-    } else {
-        throw io::InputError(
-            path + ": no \"shifts\" in it; must be a result of run --json or test --json, or a recording");
-    }
-}
-
-void read_file(const fs::path& path, const Limits& limits, json& results) {
-    if (io::looks_like_recording(path.string())) {
-        const plant::Description machine =
-            io::recorded_model_file(io::RecordingReader(path.string()).manifest()).description;
-        results[stem(path)] = to_json(score(load_run(path.string(), scorecard_signals(machine)), limits));
-        return;
-    }
-    std::ifstream file(path);
-    const json document = json::parse(file, nullptr, false);
-    if (document.is_discarded()) throw io::InputError(path.string() + ": neither a recording nor JSON");
-    take(document, stem(path), path.string(), results);
-}
-
-// A metric's value by full name ("clutch_energy_j.F3"), if the shift has it.
+// A metric's value by full name ("clutch_energy_j.F3"); NaN where the shift has none. Nothing where it cannot be
+// compared: the temperature of a clutch that is not told.
 std::optional<double> value_of(const json& shift, const std::string& full_name) {
     const auto dot = full_name.find('.');
-    const auto found = shift.find(full_name.substr(0, dot));
-    if (found == shift.end()) return std::nullopt;
+    const std::string metric = full_name.substr(0, dot);
+    const auto found = shift.find(metric);
     if (dot == std::string::npos)
-        return found->is_number() ? std::optional(found->get<double>()) : std::nullopt;
-    const auto part = found->find(full_name.substr(dot + 1));
-    return part != found->end() && part->is_number() ? std::optional(part->get<double>()) : std::nullopt;
+        return found != shift.end() && found->is_number() ? found->get<double>() : std::nan("");
+    if (found != shift.end()) {
+        const auto part = found->find(full_name.substr(dot + 1));
+        if (part != found->end()) return part->is_number() ? part->get<double>() : std::nan("");
+    }
+    // Clutches beside the shift's own are told only once they take heat.
+    if (metric == "clutch_temperature_degc") return std::nullopt;
+    return 0;
 }
 
-// Full names of a shift's metrics that are there, in the scorecard's order.
-std::vector<std::string> metrics_of(const json& shift) {
+// Full names of the metrics that one of two shifts has, in the scorecard's order.
+std::vector<std::string> metrics_of(const json& before, const json& after) {
     std::vector<std::string> names;
     for (const std::string& metric : metric_names()) {
-        const auto found = shift.find(metric);
-        if (found == shift.end()) continue;
-        if (!found->is_object()) names.push_back(metric);
-        for (auto part = found->begin(); found->is_object() && part != found->end(); ++part) {
-            names.push_back(metric + "." + part.key());
+        std::set<std::string> found;
+        for (const json* shift : {&before, &after}) {
+            const auto place = shift->find(metric);
+            if (place == shift->end()) continue;
+            if (!place->is_object()) found.insert(metric);
+            for (auto part = place->begin(); place->is_object() && part != place->end(); ++part)
+                found.insert(metric + "." + part.key());
         }
+        names.insert(names.end(), found.begin(), found.end());
     }
     return names;
 }
@@ -106,6 +67,12 @@ std::map<std::string, const json*> by_label(const json& shifts) {
         result[label] = &shift;
     }
     return result;
+}
+
+std::string number(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", value);
+    return std::isnan(value) ? "no value" : text;
 }
 
 class Comparison {
@@ -136,15 +103,18 @@ class Comparison {
             list.push_back({is ? Difference::Kind::better : Difference::Kind::worse, run, label, "completed",
                             was ? 1. : 0., is ? 1. : 0.});
         }
-        for (const std::string& metric : metrics_of(before)) {
+        for (const std::string& metric : metrics_of(before, after)) {
             const Limit* limit = limits_.find(metric.substr(0, metric.find('.')), kind_of(before));
             const std::optional<double> x = value_of(before, metric), y = value_of(after, metric);
-            if (limit == nullptr || !x || !y) continue;
-            const double scale = std::max(std::abs(*x), 0.1 * limit->good);
-            if (!(std::abs(*y - *x) > tolerance_.relative * scale)) continue;
+            if (limit == nullptr || !x || !y || !differ(*x, *y, *limit)) continue;
+            const bool worse = std::isnan(*y) || *y > *x;
             list.push_back(
-                {*y > *x ? Difference::Kind::worse : Difference::Kind::better, run, label, metric, *x, *y});
+                {worse ? Difference::Kind::worse : Difference::Kind::better, run, label, metric, *x, *y});
         }
+    }
+    bool differ(double x, double y, const Limit& limit) const {
+        if (std::isnan(x) || std::isnan(y)) return std::isnan(x) != std::isnan(y);
+        return std::abs(y - x) > tolerance_.relative * std::max(std::abs(x), 0.1 * limit.good);
     }
 
     const Limits& limits_;
@@ -152,27 +122,6 @@ class Comparison {
 };
 
 }  // namespace
-
-json read_results(const std::string& path, const Limits& limits) {
-    json results = json::object();
-    std::error_code error;
-    if (!fs::is_directory(path, error)) {
-        if (!fs::exists(path, error)) throw io::InputError(path + ": no such file");
-        read_file(path, limits, results);
-        return results;
-    }
-    std::vector<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(path)) {
-        const std::string file = entry.path().filename().string();
-        const bool wanted = file.find(".lcmlog") != std::string::npos || entry.path().extension() == ".json";
-        if (entry.is_regular_file() && wanted) files.push_back(entry.path());
-    }
-    if (files.empty())
-        throw io::InputError(path + ": no recording (*.lcmlog, *.lcmlog.zst) and no *.json in it");
-    std::sort(files.begin(), files.end());
-    for (const fs::path& file : files) read_file(file, limits, results);
-    return results;
-}
 
 std::string Difference::text() const {
     const std::string head = run + " " + shift + ": ";
@@ -182,14 +131,13 @@ std::string Difference::text() const {
     if (metric == "completed") {
         return head + (after > 0 ? "now completed, " : "no longer completed, ") + verdict;
     }
-    char text[160];
-    if (before != 0) {
-        std::snprintf(text, sizeof text, "%s %.4g → %.4g (%+.1f %%), %s", metric.c_str(), before, after,
-                      100 * (after - before) / std::abs(before), verdict);
-    } else {
-        std::snprintf(text, sizeof text, "%s %.4g → %.4g, %s", metric.c_str(), before, after, verdict);
+    std::string change;
+    if (before != 0 && !std::isnan(after - before)) {
+        char percent[32];
+        std::snprintf(percent, sizeof percent, " (%+.1f %%)", 100 * (after - before) / std::abs(before));
+        change = percent;
     }
-    return head + text;
+    return head + metric + " " + number(before) + " → " + number(after) + change + ", " + verdict;
 }
 
 std::vector<Difference> compare(const json& before, const json& after, const Limits& limits,

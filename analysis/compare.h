@@ -1,7 +1,6 @@
 // Two result sets side by side: which shift of which run got worse or better, in what, and by how much.
 //
-// A result set is what one build, one calibration or one recording says of some runs. Shifts are matched by
-// run, label and order (the second F2->F3 of a run with the second); where both sets hold a single run, the
+// Shifts are matched by run, label and order (the second F2->F3 of a run with the second); where both sets hold a single run, the
 // runs are matched whatever their names.
 #pragma once
 
@@ -13,11 +12,6 @@
 
 namespace shiftrig::analysis {
 
-// Reads a result set: a recording; a JSON file of `shiftrig run --json` or `shiftrig test --json` (an object with
-// "shifts", or an array of such objects, or an object with them in "runs"); or a folder of such files.
-// Result: {run name: shifts array}. Throws InputError or RecordingError.
-nlohmann::json read_results(const std::string& path, const Limits& limits);
-
 struct Tolerance {
     double relative = 0.02;  // of the value before, or of a tenth of the limit for `good` if that is more
 };
@@ -27,12 +21,13 @@ struct Difference {
     Kind kind{};
     std::string run, shift;  // "plough_upshift", "F2->F3"
     std::string metric;      // full name; "completed" where completion changed; empty: the shift as a whole
-    double before = 0, after = 0;
-    std::string text() const;  // `plough_upshift F2->F3: duration_s 0.412 → 0.471 (+14.3 %), worse`
+    double before = 0, after = 0;  // NaN: no value
+    std::string text() const;      // `plough_upshift F2->F3: duration_s 0.412 → 0.471 (+14.3 %), worse`
 };
 
-// What differs by more than the tolerance, in completion and in every metric that has a limit (for all of them
-// less is better). Worse first.
+// What differs by more than the tolerance, in completion and in every metric that has a limit and that one of the
+// shifts has (for all of them less is better). A clutch that one of them does not tell took no heat and did not slip
+// there; a value that is lost is worse. Worse first.
 std::vector<Difference> compare(const nlohmann::json& before, const nlohmann::json& after,
                                 const Limits& limits, const Tolerance& tolerance = {});
 

@@ -13,8 +13,9 @@
 
 namespace shiftrig::analysis {
 
-// Empty: everything held. Signals are compared in the unit the scenario writes them in. A signal, metric or device
-// that the run does not have breaks the expectation that names it.
+// Empty: everything held. Signals are compared in the unit the scenario writes them in. A signal or metric that the
+// run does not have breaks the expectation that names it; devices are held against the model before the run
+// (io::check_devices).
 std::vector<std::string> broken_expectations(const io::ScenarioFile& scenario, const Run& run,
                                              const Scorecard& card);
 

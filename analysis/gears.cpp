@@ -81,25 +81,47 @@ int nearest(const std::vector<int>& distance, const std::vector<bool>& among) {
     return best;
 }
 
-// ω_in/ω_out of the rigid devices: their columns, ω_in = 1, and of all solutions the smallest; the ratio is
-// determined if ω_out does not depend on that choice (no null vector of the system moves it).
-std::optional<double> ratio_between(int in, int out, int masses, const std::vector<Column>& rigid) {
-    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rigid.size()) + 1, masses);
-    for (std::size_t k = 0; k < rigid.size(); ++k) {
-        for (const plant::Link& link : rigid[k]) rows(static_cast<Eigen::Index>(k), link.mass) += link.factor;
-    }
-    const Eigen::Index last = rows.rows() - 1;
-    rows(last, in) = 1;
+struct GivenSpeed {
+    int mass;
+    double speed;
+};
+
+// Σ factor · speed over the links of `asked`, from the columns of the rigid devices and the speeds given: of all
+// solutions the smallest. None if the given speeds contradict the devices, or if the answer depends on that choice
+// (a null vector of the system moves it).
+std::optional<double> speed_across(const Column& asked, const std::vector<GivenSpeed>& given, int masses,
+                                   const std::vector<Column>& rigid) {
+    const auto devices = static_cast<Eigen::Index>(rigid.size());
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(devices + static_cast<Eigen::Index>(given.size()), masses);
     Eigen::VectorXd wanted = Eigen::VectorXd::Zero(rows.rows());
-    wanted(last) = 1;
+    for (Eigen::Index k = 0; k < devices; ++k) {
+        for (const plant::Link& link : rigid[static_cast<std::size_t>(k)]) rows(k, link.mass) += link.factor;
+    }
+    Eigen::Index row = devices;
+    for (const GivenSpeed& each : given) {
+        rows(row, each.mass) = 1;
+        wanted(row++) = each.speed;
+    }
+    Eigen::VectorXd direction = Eigen::VectorXd::Zero(masses);
+    for (const plant::Link& link : asked) direction(link.mass) += link.factor;
     const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(rows);
     const Eigen::VectorXd speed = solver.solve(wanted);
-    if ((rows * speed - wanted).norm() > 1e-9) return std::nullopt;  // the input is held
-    Eigen::VectorXd unit = Eigen::VectorXd::Zero(masses);
-    unit(out) = 1;
-    if ((unit - solver.pseudoInverse() * (rows * unit)).norm() > 1e-9) return std::nullopt;
-    if (std::abs(speed(out)) < 1e-12) return std::nullopt;
-    return 1 / speed(out);
+    if ((rows * speed - wanted).norm() > 1e-9) return std::nullopt;
+    if ((direction - solver.pseudoInverse() * (rows * direction)).norm() > 1e-9) return std::nullopt;
+    return direction.dot(speed);
+}
+
+// ω_in/ω_out.
+std::optional<double> ratio_between(int in, int out, int masses, const std::vector<Column>& rigid) {
+    const auto speed = speed_across({{out, 1}}, {{in, 1}}, masses, rigid);
+    if (!speed || std::abs(*speed) < 1e-12) return std::nullopt;
+    return 1 / *speed;
+}
+
+std::vector<Column> meshes_of(const plant::Structure& structure) {
+    std::vector<Column> meshes;
+    for (const plant::Mesh& mesh : structure.meshes) meshes.push_back(column_of(mesh.column(mesh.ratio)));
+    return meshes;
 }
 
 }  // namespace
@@ -107,9 +129,8 @@ std::optional<double> ratio_between(int in, int out, int masses, const std::vect
 std::vector<Gear> gears_of(const plant::Description& description) {
     const plant::Structure structure = plant::build_structure(description);
     const int masses = structure.masses();
-    std::vector<Column> meshes, all;
-    for (const plant::Mesh& mesh : structure.meshes) meshes.push_back(column_of(mesh.column(mesh.ratio)));
-    all = meshes;
+    const std::vector<Column> meshes = meshes_of(structure);
+    std::vector<Column> all = meshes;
     for (const plant::FrictionPair& pair : structure.pairs) all.push_back(column_of(pair.links));
     for (const plant::Elastic& shaft : structure.shafts) all.push_back(column_of(shaft.links));
     for (const plant::Elastic& damper : structure.dampers) all.push_back(column_of(damper.links));
@@ -154,6 +175,28 @@ std::vector<Gear> gears_of(const plant::Description& description) {
         gears.push_back(std::move(gear));
     }
     return gears;
+}
+
+std::optional<double> slip_per_input_speed(const plant::Description& description, const Gear& from,
+                                           const Gear& to, const std::string& clutch) {
+    const plant::Structure structure = plant::build_structure(description);
+    const int asked = structure.pair(clutch), in = structure.mass(to.in), out = structure.mass(to.out);
+    if (asked < 0 || in < 0 || out < 0) return std::nullopt;
+    std::vector<Column> rigid = meshes_of(structure);
+    std::vector<std::string> held;  // by the old gear
+    for (const plant::GearPath& path : description.gear_paths) {
+        if (path.name == from.name) held = path.closed;
+    }
+    for (const plant::GearPath& path : description.gear_paths) {
+        if (path.name != to.name) continue;
+        for (const std::string& name : path.closed) {
+            const int pair = structure.pair(name);
+            if (pair >= 0 && contains(held, name))
+                rigid.push_back(column_of(structure.pairs[static_cast<std::size_t>(pair)].links));
+        }
+    }
+    const Column slip = column_of(structure.pairs[static_cast<std::size_t>(asked)].links);
+    return speed_across(slip, {{in, 1}, {out, 0}}, structure.masses(), rigid);
 }
 
 }  // namespace shiftrig::analysis

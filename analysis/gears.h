@@ -24,4 +24,10 @@ struct Gear {
 // In the order of description.gear_paths. Throws plant::ModelError where the description is not a machine.
 std::vector<Gear> gears_of(const plant::Description& description);
 
+// By how much a clutch slips per speed that the gearbox's input runs ahead of its output, on the way from one gear to
+// another, where only the clutches of both hold: 1 from the input to a wheel on the output, −1 where the same clutch
+// is written the other way around. None where the other open clutches have a say in it.
+std::optional<double> slip_per_input_speed(const plant::Description& description, const Gear& from,
+                                           const Gear& to, const std::string& clutch);
+
 }  // namespace shiftrig::analysis

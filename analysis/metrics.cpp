@@ -22,7 +22,8 @@ constexpr double carries = 0.05;  // share of the torque before that counts as c
 
 class Meter {
   public:
-    Meter(const Run& run, const Shift& shift) : run_(run), shift_(shift) {
+    Meter(const Run& run, const std::vector<Gear>& gears, const Shift& shift)
+        : run_(run), gears_(gears), shift_(shift) {
         const auto n = static_cast<double>(run.time.size());
         interval_ = run.time.size() > 1 ? (run.time.back() - run.time.front()) / (n - 1) : 1e-3;
         const double t = run.time[shift.asked];
@@ -220,7 +221,7 @@ class Meter {
         std::optional<Row> leaves;
         for (const std::string& name : shift_.offgoing) {
             const Values* slip = clutch(name, "slip");
-            const Values* speed = first_link_speed(name);
+            const Values* speed = input_speed();
             if (slip == nullptr || speed == nullptr) return {};
             const auto row = first_row(shift_.asked, shift_.ended, [&](Row i) {
                 return std::abs((*slip)[i]) > 0.02 * std::max(std::abs((*speed)[i]), 0.5);
@@ -230,41 +231,47 @@ class Meter {
         if (!leaves) return 0.0;
         return run_.time[shift_.ended] - run_.time[*leaves];
     }
-    // How far the input runs above both the old and the new gear's speed: over [t_a, t_e], the least slip, in the
-    // sense of the input running ahead, that the offgoing and the oncoming clutch share.
+    // How far the input runs above both the old and the new gear's speed: over [t_a, t_e], the lesser of what the
+    // slips of the offgoing and of the oncoming clutch make of it.
     Value flare() const {
         if (shift_.oncoming.size() != 1 || shift_.offgoing.size() != 1 || standing_start()) return {};
-        const Values *on = clutch(shift_.oncoming[0], "slip"), *off = clutch(shift_.offgoing[0], "slip");
-        const Values* speed = first_link_speed(shift_.oncoming[0]);
-        if (on == nullptr || off == nullptr || speed == nullptr) return {};
+        const std::string &oncoming = shift_.oncoming[0], &offgoing = shift_.offgoing[0];
+        const Values *on = clutch(oncoming, "slip"), *off = clutch(offgoing, "slip"), *speed = input_speed();
+        const Value per_on = slip_per_input(oncoming), per_off = slip_per_input(offgoing);
+        if (on == nullptr || off == nullptr || speed == nullptr || !per_on || !per_off) return {};
         const double sign = mean_before(*speed) < 0 ? -1 : 1;
         double result = 0;
-        for (Row i = shift_.asked; i <= shift_.ended; ++i) {
-            result = std::max(result, std::min(sign * (*on)[i], sign * (*off)[i]));
-        }
+        for (Row i = shift_.asked; i <= shift_.ended; ++i)
+            result = std::max(result, std::min(sign * (*on)[i] / *per_on, sign * (*off)[i] / *per_off));
         return result;
     }
 
-    // ---- clutches ----
+    // ---- the gears ----
 
-    const plant::Clutch* description(const std::string& name) const {
-        for (const plant::Clutch& candidate : run_.machine.clutches) {
+    const Gear* gear(const std::string& name) const {
+        for (const Gear& candidate : gears_) {
             if (candidate.name == name) return &candidate;
         }
         return nullptr;
     }
-    const Values* first_link_speed(const std::string& name) const {
-        const plant::Clutch* pair = description(name);
-        return pair == nullptr ? nullptr : run_.column("mass." + pair->a + ".speed");
+    // Of the gearbox.
+    const Values* input_speed() const {
+        const Gear* to = gear(shift_.to);
+        return to == nullptr ? nullptr : run_.column("mass." + to->in + ".speed");
     }
+    Value slip_per_input(const std::string& clutch) const {
+        const Gear *from = gear(shift_.from), *to = gear(shift_.to);
+        if (from == nullptr || to == nullptr) return {};
+        const Value per = slip_per_input_speed(run_.machine, *from, *to, clutch);
+        return per && *per != 0 ? per : Value{};
+    }
+
+    // ---- clutches ----
+
     // Pairs that are there to hold, not to select a gear or to brake: the main clutch, a Coulomb wheel contact.
     bool is_holding_pair(const plant::Clutch& pair) const {
-        for (const plant::GearPath& path : run_.machine.gear_paths) {
-            const bool closed =
-                std::find(path.closed.begin(), path.closed.end(), pair.name) != path.closed.end();
-            if (!closed && pair.radius == 0) return false;
-        }
-        return true;
+        const auto& common = gears_.front().common;  // the same of every gear
+        return pair.radius != 0 || std::find(common.begin(), common.end(), pair.name) != common.end();
     }
     // Clutches of this shift always; others only if they took heat in it, other than the drag of open plates.
     bool worth_telling(const std::string& name) const {
@@ -297,6 +304,7 @@ class Meter {
     }
 
     const Run& run_;
+    const std::vector<Gear>& gears_;
     const Shift& shift_;
     double interval_ = 1e-3;  // [s]
     Row first_ = 0, last_ = 0, mean_from_ = 0;
@@ -304,8 +312,8 @@ class Meter {
 
 }  // namespace
 
-std::vector<Metric> measure(const Run& run, const Shift& shift) {
-    return Meter(run, shift).all();
+std::vector<Metric> measure(const Run& run, const std::vector<Gear>& gears, const Shift& shift) {
+    return Meter(run, gears, shift).all();
 }
 
 }  // namespace shiftrig::analysis

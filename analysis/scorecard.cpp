@@ -58,9 +58,12 @@ const Metric* ShiftScore::find(std::string_view full_name) const noexcept {
 
 Scorecard score(const Run& run, const Limits& limits) {
     Scorecard card;
-    for (Shift& shift : find_shifts(run, limits.rules)) {
+    std::vector<Shift> shifts = find_shifts(run, limits.rules);
+    if (shifts.empty()) return card;
+    const std::vector<Gear> gears = gears_of(run.machine);
+    for (Shift& shift : shifts) {
         ShiftScore result;
-        result.metrics = measure(run, shift);
+        result.metrics = measure(run, gears, shift);
         for (Metric& metric : result.metrics) {
             if (metric.value) metric.verdict = judge(*metric.value, limits.find(metric.name, shift.kind));
             result.verdict = worse(result.verdict, metric.verdict);

@@ -43,8 +43,8 @@ struct Scorecard {
 
 Scorecard score(const Run& run, const Limits& limits = default_limits());
 
-// The metrics of one shift, not yet judged (metrics.cpp).
-std::vector<Metric> measure(const Run& run, const Shift& shift);
+// The metrics of one shift between two of the run's gears, not yet judged (metrics.cpp).
+std::vector<Metric> measure(const Run& run, const std::vector<Gear>& gears, const Shift& shift);
 
 // An array of {from, to, kind, completed, end, asked_s, ended_s, verdict, duration_s, …,
 // clutch_energy_j: {F2: …, F3: …}, …, verdicts: {duration_s: "good", "clutch_energy_j.F3": "reject"}}.

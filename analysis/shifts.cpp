@@ -1,11 +1,12 @@
 #include "analysis/shifts.h"
 
 #include <algorithm>
-#include <bit>
+#include <bitset>
 #include <cmath>
-#include <cstdint>
 #include <optional>
 #include <variant>
+
+#include "io/input_error.h"
 
 namespace shiftrig::analysis {
 
@@ -46,12 +47,13 @@ CommandSignal command_of(const plant::Clutch& clutch) {
 }
 
 // One bit per clutch that selects gears.
-using Clutches = std::uint64_t;
+constexpr std::size_t most_selectors = 256;
+using Clutches = std::bitset<most_selectors>;
 
 // A gear with the columns its ratio is read from.
 struct GearView {
     const Gear* gear;
-    Clutches mask = 0;
+    Clutches mask{};
     const std::vector<double>*in = nullptr, *out = nullptr;  // speeds, nullptr if not in the run
     struct Common {
         const std::vector<double>*slip, *speed;
@@ -63,8 +65,8 @@ class Finder {
   public:
     Finder(const Run& run, const ShiftRules& rules)
         : run_(run), rules_(rules), rows_(run.time.size()), gears_(gears_of(run.machine)) {
-        commanded_.assign(rows_, 0);
-        locked_.assign(rows_, 0);
+        commanded_.resize(rows_);
+        locked_.resize(rows_);
         for (const Gear& gear : gears_) views_.push_back(view_of(gear));
         lever_ = run.column("driver.lever");
     }
@@ -73,7 +75,7 @@ class Finder {
         for (Row i = 0; i < rows_; ++i) {
             follow_gear(i);
             const Clutches oncoming = newly_commanded(i) & ~mask(gear_) & ~locked_[i];
-            if (oncoming == 0) continue;
+            if (oncoming.none()) continue;
             const int to = target(i, oncoming);
             if (to == no_gear || to == gear_) continue;
             shifts_.push_back(follow_shift(i, to));
@@ -107,14 +109,21 @@ class Finder {
     // The bit of a clutch; its columns are read when it is first asked for.
     Clutches bit_of(const std::string& name) {
         const auto place = std::find(selectors_.begin(), selectors_.end(), name);
-        const Clutches bit = Clutches{1} << (place - selectors_.begin());
+        const auto number = static_cast<std::size_t>(place - selectors_.begin());
+        if (number >= most_selectors)
+            throw io::InputError("model \"" + run_.machine.name + "\": gear_paths: more than " +
+                                 std::to_string(most_selectors) +
+                                 " clutches select gears; shifts cannot be told apart");
+        const Clutches bit = Clutches{}.set(number);
         if (place != selectors_.end()) return bit;
         selectors_.push_back(name);
         const plant::Clutch* clutch = clutch_of(run_.machine, name);
         if (clutch == nullptr) return bit;
         const auto mark = [&](std::vector<Clutches>& rows, const std::vector<double>* column,
                               const auto& test) {
-            for (Row i = 0; column != nullptr && i < rows_; ++i) rows[i] |= test((*column)[i]) ? bit : 0;
+            for (Row i = 0; column != nullptr && i < rows_; ++i) {
+                if (test((*column)[i])) rows[i] |= bit;
+            }
             return column != nullptr;
         };
         const CommandSignal command = command_of(*clutch);
@@ -124,15 +133,17 @@ class Finder {
         return bit;
     }
     Clutches mask(int gear) const {
-        return gear == no_gear ? 0 : views_[static_cast<std::size_t>(gear)].mask;
+        return gear == no_gear ? Clutches{} : views_[static_cast<std::size_t>(gear)].mask;
     }
-    Clutches newly_commanded(Row i) const { return commanded_[i] & ~(i == 0 ? 0 : commanded_[i - 1]); }
+    Clutches newly_commanded(Row i) const {
+        return i == 0 ? commanded_[i] : commanded_[i] & ~commanded_[i - 1];
+    }
 
     // ---- which gear is in ----
 
     void follow_gear(Row i) {
         for (int gear = 0; gear < static_cast<int>(views_.size()); ++gear) {
-            if (locked_[i] == mask(gear) && mask(gear) != 0) gear_ = last_gear_ = gear;
+            if (locked_[i] == mask(gear) && mask(gear).any()) gear_ = last_gear_ = gear;
         }
         // Neutral once no clutch is locked that makes a gear and the last gear's command is gone.
         if (gear_ != no_gear && locked_[i] != mask(gear_) && (commanded_[i] & mask(gear_)) != mask(gear_))
@@ -144,7 +155,7 @@ class Finder {
     // what is commanded now.
     int target(Row begun, Clutches oncoming) const {
         const double until = run_.time[begun] + rules_.launch_timeout;
-        const auto leads_to = [&](int gear) { return gear != gear_ && (mask(gear) & oncoming) != 0; };
+        const auto leads_to = [&](int gear) { return gear != gear_ && (mask(gear) & oncoming).any(); };
         const int gears = static_cast<int>(views_.size());
         for (Row i = begun; i < rows_ && run_.time[i] <= until && (commanded_[i] & oncoming) == oncoming;
              ++i) {
@@ -154,7 +165,7 @@ class Finder {
         }
         int best = no_gear, most = -1;
         for (int gear = 0; gear < gears; ++gear) {
-            const int kept = std::popcount(mask(gear) & commanded_[begun]);
+            const int kept = static_cast<int>((mask(gear) & commanded_[begun]).count());
             if (leads_to(gear) && kept > most) {
                 most = kept;
                 best = gear;
@@ -187,17 +198,18 @@ class Finder {
             return shift;
         };
         const Clutches oncoming = mask(to) & ~mask(from), strangers = ~(mask(to) | mask(from));
-        std::optional<Row> in_ratio;  // since when
+        bool in_ratio = false;
+        Row since = begun;
         for (Row i = begun; i < rows_; ++i) {
             const bool holds = ratio_holds(views_[static_cast<std::size_t>(to)], i);
-            if (!holds) in_ratio.reset();
-            if (holds && !in_ratio) in_ratio = i;
-            if (in_ratio && (run_.time[i] - run_.time[*in_ratio] >= rules_.hold || i + 1 == rows_)) {
-                return finish(ShiftEnd::completed, *in_ratio);
+            if (holds && !in_ratio) since = i;
+            in_ratio = holds;
+            if (in_ratio && (run_.time[i] - run_.time[since] >= rules_.hold || i + 1 == rows_)) {
+                return finish(ShiftEnd::completed, since);
             }
-            if (i > begun && (commanded_[i - 1] & ~commanded_[i] & oncoming))
+            if (i > begun && (commanded_[i - 1] & ~commanded_[i] & oncoming).any())
                 return finish(ShiftEnd::taken_back, i);
-            if (i > begun && (newly_commanded(i) & strangers)) return finish(ShiftEnd::overtaken, i);
+            if (i > begun && (newly_commanded(i) & strangers).any()) return finish(ShiftEnd::overtaken, i);
             if (run_.time[i] >= time_over && !in_ratio) return finish(ShiftEnd::timed_out, i);
         }
         return finish(ShiftEnd::run_ended, rows_ - 1);
@@ -262,7 +274,7 @@ class Finder {
     Names names(Clutches clutches) const {
         Names list;
         for (std::size_t k = 0; k < selectors_.size(); ++k) {
-            if (clutches >> k & 1) list.push_back(selectors_[k]);
+            if (clutches[k]) list.push_back(selectors_[k]);
         }
         return list;
     }

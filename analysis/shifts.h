@@ -57,7 +57,8 @@ struct Shift {
     std::string label() const { return from + "->" + to; }   // "F2->F3", as scenarios write it
 };
 
-// In the order of time. Empty where the machine has no gear paths or the run lacks clutch states.
+// In the order of time. Empty where the machine has no gear paths or the run lacks clutch states. Throws io::InputError
+// where more clutches select gears than can be told apart (256).
 std::vector<Shift> find_shifts(const Run& run, const ShiftRules& rules = {});
 
 // The signals that shifts and their metrics are read from, as far as the machine has them: what a run has to

@@ -5,6 +5,7 @@
 
 #include "io/field_reader.h"
 #include "io/field_schema.h"
+#include "io/nearest.h"
 #include "io/scenario_fields.h"
 #include "io/units.h"
 
@@ -35,7 +36,18 @@ int line_of(const ReadContext& context, const std::string& key) {
     return 0;
 }
 
-Expectations expectations(const std::string& path, const ExpectText& text) {
+// An event is looked for in its window: one without time in it would forbid nothing.
+void check_window(const std::string& path, const ExpectedEvent& event, double duration) {
+    const auto refuse = [&](double from, const std::string& rule) {
+        throw InputError(path, event.line, event.column,
+                         "expect: " + event.kind + " from_s = " + in_digits(from) + "; must be below " + rule);
+    };
+    const auto [from, until] = event.window;
+    if (!(from < until)) refuse(from, "until_s = " + in_digits(until));
+    if (!(from < duration)) refuse(from, "duration_s = " + in_digits(duration));
+}
+
+Expectations expectations(const std::string& path, const ExpectText& text, double duration) {
     Expectations expect;
     expect.shifts_given = text.no_shifts || !text.shifts.empty();
     for (const auto& shift : text.shifts) {
@@ -55,9 +67,11 @@ Expectations expectations(const std::string& path, const ExpectText& text) {
         expect.signals.push_back(
             {last.quantity, {rules::unbounded, rules::unbounded}, last.minimum, last.maximum});
 
-    for (const auto& event : expect.events)
+    for (const auto& event : expect.events) {
         if (event.kind.empty())
             throw InputError(path, event.line, event.column, "expect: the event's kind is missing");
+        check_window(path, event, duration);
+    }
     for (auto& bound : expect.signals) {
         if (bound.minimum == -rules::unbounded && bound.maximum == rules::unbounded)
             throw InputError(path, bound.quantity.line, bound.quantity.column,
@@ -118,7 +132,7 @@ ScenarioFile parse_scenario(const std::string& text, const std::string& path) {
     scenario.start.options_line = line_of(context, "start.options");
     scenario.start.locked_line = line_of(context, "start.locked");
     scenario.timeline = by_time(path, written.timeline, scenario.duration);
-    scenario.expect = expectations(path, written.expect);
+    scenario.expect = expectations(path, written.expect, scenario.duration);
     scenario.expect.no_shifts_line = line_of(context, "expect.no_shifts");
     return scenario;
 }
@@ -134,6 +148,19 @@ void check_signals(const ScenarioFile& scenario, const SignalTable& signals) {
     for (const auto& moment : scenario.timeline) check_setting(scenario, moment.setting, signals);
     for (const auto& bound : scenario.expect.signals)
         check(scenario, bound.quantity, bound.quantity.signal, signals);
+}
+
+void check_devices(const ScenarioFile& scenario, const std::vector<std::string>& devices) {
+    for (const auto& event : scenario.expect.events) {
+        const auto refuse = [&](const std::string& what) {
+            throw InputError(scenario.path, event.line, event.column, "expect: " + event.kind + what);
+        };
+        if (event.device.empty()) continue;
+        if (event.kind == "safe_command") refuse(" is of no device: it is the bench's own");
+        if (std::find(devices.begin(), devices.end(), event.device) == devices.end())
+            refuse(" of " + event.device + ": no device of this model has events by that name" +
+                   nearest_hint(event.device, devices));
+    }
 }
 
 nlohmann::ordered_json scenario_schema() {

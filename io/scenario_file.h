@@ -133,6 +133,10 @@ ScenarioFile parse_scenario(const std::string& text, const std::string& path);
 // the place, and the nearest signal or the rule. Masses in start.speeds are checked against `mass.<name>.speed`.
 void check_signals(const ScenarioFile& scenario, const SignalTable& signals);
 
+// Every device whose events the scenario expects is among those that tell events (plant::Model::device_names());
+// throws InputError naming the place and the nearest device.
+void check_devices(const ScenarioFile& scenario, const std::vector<std::string>& devices);
+
 nlohmann::ordered_json scenario_schema();
 
 }  // namespace shiftrig::io

@@ -93,22 +93,25 @@ json series(const Run& run, const Decimation& kept) {
     return {{"t", base64(time.data(), time.size() * sizeof(double))}, {"columns", columns}};
 }
 
+// The change of every account over the recording, which may begin in the middle of a run.
 json energy(const Run& run) {
-    const auto at_end = [&](std::string_view name) {
-        const auto* column = run.column(name);
-        return column && !column->empty() ? column->back() : 0.0;
+    const auto change_of = [](const std::vector<double>& column) {
+        return column.empty() ? 0.0 : column.back() - column.front();
     };
-    const auto* stored = run.column("energy.stored");
+    const auto change = [&](std::string_view name) {
+        const auto* column = run.column(name);
+        return column ? change_of(*column) : 0.0;
+    };
     json by_device = json::object();
     for (const auto& column : run.columns)
         if (column.signal.name.starts_with("clutch.") && column.signal.name.ends_with(".heat") &&
             !column.value.empty())
-            by_device[column.signal.name.substr(7, column.signal.name.size() - 12)] = column.value.back();
-    return {{"input_j", at_end("energy.input")},
-            {"stored_change_j", stored && !stored->empty() ? stored->back() - stored->front() : 0.0},
+            by_device[column.signal.name.substr(7, column.signal.name.size() - 12)] = change_of(column.value);
+    return {{"input_j", change("energy.input")},
+            {"stored_change_j", change("energy.stored")},
             {"dissipated_j", by_device},
-            {"dissipated_total_j", at_end("energy.dissipated")},
-            {"defect_j", at_end("energy.defect")}};
+            {"dissipated_total_j", change("energy.dissipated")},
+            {"defect_j", change("energy.defect")}};
 }
 
 // Safe inside <script>: no "</", no "<!--".

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/compare.h"
+#include "analysis/result_set.h"
 #include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/command.h"
 

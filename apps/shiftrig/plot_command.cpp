@@ -2,7 +2,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <iostream>
@@ -44,12 +46,25 @@ void convert(const std::string& svg, const std::string& png) {
     }
 }
 
+std::string seconds(double value) {
+    char text[40];
+    std::snprintf(text, sizeof text, "%.3f s", value);
+    return text;
+}
+
 analysis::Plot plot_of(const analysis::Run& run, const Options& options) {
     if (run.time.size() < 2) throw std::runtime_error(options.recording + ": fewer than two ticks");
     if (options.from >= 0 || options.until >= 0) {
+        const double from = std::max(options.from, 0.0);
         const double until = options.until >= 0 ? options.until : run.time.back();
-        if (until <= options.from) throw std::runtime_error("--until must be later than --from");
-        return analysis::plot_of_stretch(run, std::max(options.from, 0.0), until);
+        if (options.until >= 0 && until <= from)
+            throw std::runtime_error("--until must be later than --from");
+        const auto first = std::lower_bound(run.time.begin(), run.time.end(), from);
+        if (std::upper_bound(run.time.begin(), run.time.end(), until) - first < 2)
+            throw std::runtime_error(options.recording + ": no two ticks between " + seconds(from) + " and " +
+                                     seconds(until) + "; it is from " + seconds(run.time.front()) + " to " +
+                                     seconds(run.time.back()));
+        return analysis::plot_of_stretch(run, from, until);
     }
     const std::vector<analysis::Shift> shifts = analysis::find_shifts(run);
     if (shifts.empty()) return analysis::plot_of_stretch(run, run.time.front(), run.time.back());

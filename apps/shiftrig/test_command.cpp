@@ -5,13 +5,15 @@
 #include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
-#include <set>
 #include <thread>
 
 #include "analysis/expectations.h"
@@ -32,6 +34,12 @@ struct Options : RigOptions {
     std::vector<std::string> scenarios;
     std::string junit, limits, record_folder;
     int jobs = 1;
+    bool json = false;
+};
+
+// What a scenario's run came to: its verdict, and the scorecard of every shift.
+struct Outcome : analysis::TestResult {
+    nlohmann::json shifts = nlohmann::json::array();
 };
 
 using Clock = std::chrono::steady_clock;
@@ -94,8 +102,8 @@ std::vector<std::size_t> by_duration(const std::vector<Case>& cases) {
     return order;
 }
 
-analysis::TestResult run_one(const Options& options, const analysis::Limits& limits, const Case& each) {
-    analysis::TestResult result;
+Outcome run_one(const Options& options, const analysis::Limits& limits, const Case& each) {
+    Outcome result;
     result.file = result.name = each.path;
     result.error = each.error;
     if (!each.scenario) return result;
@@ -134,7 +142,9 @@ analysis::TestResult run_one(const Options& options, const analysis::Limits& lim
             result.error = path + ": " + missing;
         } else if (result.failures.empty()) {
             const analysis::Run run = collector.finish(rig);
-            result.failures = analysis::broken_expectations(scenario, run, analysis::score(run, limits));
+            const analysis::Scorecard card = analysis::score(run, limits);
+            result.failures = analysis::broken_expectations(scenario, run, card);
+            result.shifts = analysis::to_json(card);
             if (result.expectations == 0)
                 result.failures.push_back(path + ": expects nothing, so it tests nothing");
         }
@@ -161,12 +171,40 @@ void tell(const analysis::TestResult& result) {
     std::fflush(stdout);
 }
 
+nlohmann::json to_json(const std::vector<Outcome>& results, std::size_t failures) {
+    nlohmann::json runs = nlohmann::json::array();
+    for (const Outcome& result : results) {
+        nlohmann::json run = {{"scenario", result.file},
+                              {"passed", result.passed()},
+                              {"expectations", result.expectations},
+                              {"failures", result.failures},
+                              {"sim_time_s", result.sim_time_s},
+                              {"wall_time_s", result.wall_time_s},
+                              {"shifts", result.shifts}};
+        if (!result.error.empty()) run["error"] = result.error;
+        runs.push_back(std::move(run));
+    }
+    return {{"failed", failures}, {"runs", std::move(runs)}};
+}
+
+// The same file under two spellings is one scenario; recordings are called by the scenario's name alone.
+void refuse_repeated(const Options& options) {
+    std::map<std::string, std::string> by_place, by_name;
+    for (const auto& path : options.scenarios) {
+        const auto place = std::filesystem::weakly_canonical(path);
+        if (!by_place.emplace(place.string(), path).second)
+            throw std::invalid_argument("scenario " + path + " is given twice");
+        const auto [first, is_new] = by_name.emplace(place.stem().string(), path);
+        if (!is_new && !options.record_folder.empty())
+            throw std::invalid_argument("--record: scenarios " + first->second + " and " + path +
+                                        " would both be recorded as " + first->first + ".lcmlog");
+    }
+}
+
 int run(const Options& options) {
     const analysis::Limits limits =
         options.limits.empty() ? analysis::default_limits() : analysis::read_limits(options.limits);
-    std::set<std::string> seen;
-    for (const auto& path : options.scenarios)
-        if (!seen.insert(path).second) throw std::invalid_argument("scenario " + path + " is given twice");
+    refuse_repeated(options);
     // A bus outside the process can carry one rig at a time.
     const bool alone = std::any_of(options.choices.buses.begin(), options.choices.buses.end(),
                                    [](const std::string& bus) { return bus != "inprocess"; });
@@ -176,7 +214,7 @@ int run(const Options& options) {
     std::vector<Case> cases;
     for (const auto& path : options.scenarios) cases.push_back(read_case(path));
     const std::vector<std::size_t> order = by_duration(cases);
-    std::vector<analysis::TestResult> results(cases.size());
+    std::vector<Outcome> results(cases.size());
     std::atomic<std::size_t> next{0};
     std::size_t done = 0;
     std::mutex telling;
@@ -188,7 +226,7 @@ int run(const Options& options) {
             const std::lock_guard lock(telling);
             ++done;
             if (terminal) std::fprintf(stderr, "\r\033[K");
-            tell(results[i]);
+            if (!options.json) tell(results[i]);
             if (terminal) std::fprintf(stderr, "%zu of %zu scenarios", done, results.size());
         }
     };
@@ -205,11 +243,15 @@ int run(const Options& options) {
         simulated += result.sim_time_s;
         failures += result.passed() ? 0 : 1;
     }
-    std::printf("%zu scenarios, %zu failed; %.1f s simulated in %.2f s, %.0f times real time\n",
-                results.size(), failures, simulated, wall, wall > 0 ? simulated / wall : 0);
+    if (options.json)
+        std::cout << to_json(results, failures).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)
+                  << std::endl;
+    else
+        std::printf("%zu scenarios, %zu failed; %.1f s simulated in %.2f s, %.0f times real time\n",
+                    results.size(), failures, simulated, wall, wall > 0 ? simulated / wall : 0);
     if (!options.junit.empty()) {
         std::ofstream file(options.junit);
-        file << analysis::junit_xml(results);
+        file << analysis::junit_xml({results.begin(), results.end()});
         file.close();
         if (!file) throw std::runtime_error(options.junit + ": cannot be written");
     }
@@ -223,12 +265,16 @@ Command::Run declare(CLI::App& app) {
     options->add_common_to(app, "free");
     app.add_option("SCENARIO", options->scenarios, "scenario files with expectations (YAML)")->required();
     app.add_option("--junit", options->junit, "results as JUnit XML");
+    app.add_flag(
+        "--json", options->json,
+        "one JSON object on standard output, with the scorecard of every shift: for shiftrig compare");
     add_number(app, "--jobs", options->jobs, {1, 1024},
                "scenarios side by side; one at a time on a bus outside the process")
         ->capture_default_str();
     app.add_option("--limits", options->limits,
                    "of the scorecard (YAML); else config/limits.yaml as built in");
-    app.add_option("--record", options->record_folder, "keep a recording of every scenario in this folder")
+    app.add_option("--record", options->record_folder,
+                   "keep a recording of every scenario in this folder, called by its name")
         ->check(CLI::ExistingDirectory);
     return [options] { return run(*options); };
 }

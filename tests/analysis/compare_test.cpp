@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "analysis/result_set.h"
 #include "io/input_error.h"
 
 namespace shiftrig::analysis {
@@ -76,6 +78,40 @@ TEST(Compare, FromNothingToSomethingCounts) {
     EXPECT_EQ(found[0].text(), "plough F2->F3: slip_time_s.Fc 0 → 0.05, worse");
 }
 
+// The scorecard tells clutches beside the shift's own only once they take heat: what it does not tell took none.
+TEST(Compare, AClutchThatBeginsToBurnIsWorseAndOneThatCeasesToIsBetter) {
+    json after = two_runs();
+    after["plough"][0]["clutch_energy_j"]["Fc"] = 90000.0;
+    after["plough"][0]["clutch_peak_power_w"]["Fc"] = 70000.0;
+    after["plough"][0]["clutch_temperature_degc"]["Fc"] = 400.0;  // of which no value before is known
+    const auto found = compare(two_runs(), after, default_limits());
+    ASSERT_EQ(found.size(), 2u);
+    EXPECT_EQ(found[0].text(), "plough F2->F3: clutch_energy_j.Fc 0 → 9e+04, worse");
+    EXPECT_EQ(found[1].text(), "plough F2->F3: clutch_peak_power_w.Fc 0 → 7e+04, worse");
+    const auto back = compare(after, two_runs(), default_limits());
+    ASSERT_EQ(back.size(), 2u);
+    EXPECT_EQ(back[0].text(), "plough F2->F3: clutch_energy_j.Fc 9e+04 → 0 (-100.0 %), better");
+}
+
+TEST(Compare, AMetricWhoseValueIsLostIsWorse) {
+    for (const json& lost : {json(), json(std::nan(""))}) {
+        json after = two_runs();
+        after["plough"][0]["peak_jerk_m_s3"] = lost;
+        after["plough"][0]["clutch_energy_j"]["F3"] = lost;
+        const auto found = compare(two_runs(), after, default_limits());
+        ASSERT_EQ(found.size(), 2u);
+        EXPECT_EQ(found[0].text(), "plough F2->F3: clutch_energy_j.F3 3100 → no value, worse");
+        EXPECT_EQ(found[1].text(), "plough F2->F3: peak_jerk_m_s3 8 → no value, worse");
+        const auto back = compare(after, two_runs(), default_limits());
+        ASSERT_EQ(back.size(), 2u);
+        EXPECT_EQ(back[1].text(), "plough F2->F3: peak_jerk_m_s3 no value → 8, better");
+        EXPECT_TRUE(compare(after, after, default_limits()).empty());
+    }
+    json after = two_runs();
+    after["plough"][0].erase("peak_jerk_m_s3");
+    EXPECT_EQ(compare(two_runs(), after, default_limits()).size(), 1u);
+}
+
 TEST(Compare, LostCompletionAndLostShiftsComeFirst) {
     json after = two_runs();
     after["plough"][0]["completed"] = false;
@@ -129,6 +165,36 @@ TEST_F(ResultFiles, AreReadAloneInListsAndInFolders) {
                               .dump());
     EXPECT_EQ(read_results(list, default_limits()), (json{{"a", shifts}, {"b", json::array()}}));
     EXPECT_EQ(read_results(folder.string(), default_limits()).size(), 3u);
+}
+
+TEST_F(ResultFiles, KeepDotsInTheirNamesAndRefuseANameThatIsTaken) {
+    const std::string shifts = json{{"shifts", two_runs()["road"]}}.dump();
+    file("shift.v1.json", shifts);
+    file("shift.v2.json", shifts);
+    const json results = read_results(folder.string(), default_limits());
+    EXPECT_TRUE(results.contains("shift.v1"));
+    EXPECT_TRUE(results.contains("shift.v2"));
+    file("z.json", R"({"scenario": "b/shift.v1.yaml", "shifts": []})");
+    EXPECT_EQ(refusal(folder.string()), "z.json: run \"shift.v1\" is there already, from " +
+                                            (folder / "shift.v1.json").string() +
+                                            "; runs are told apart by name");
+}
+
+TEST_F(ResultFiles, ThatAreIllTypedAreNamedWithFileRunShiftKeyAndRule) {
+    const auto refused = [this](const std::string& shift) {
+        return refusal(file("r.json", "{\"shifts\": [" + shift + "]}"));
+    };
+    const std::string place = "r.json: run \"r\", shift 1: ";
+    EXPECT_EQ(refused(R"({"from": 3, "to": "F4"})"), place + "from = 3; must be a word");
+    EXPECT_EQ(refused(R"({"from": "F3"})"), place + "to is missing");
+    EXPECT_EQ(refused("7"), place + "it = 7; must be an object");
+    EXPECT_EQ(refused(R"({"from": "F3", "to": "F4", "completed": 1})"),
+              place + "completed = 1; must be true or false");
+    EXPECT_EQ(refused(R"({"from": "F3", "to": "F4", "duration_s": "fast"})"),
+              place + "duration_s = \"fast\"; must be a number or null");
+    EXPECT_EQ(refused(R"({"from": "F3", "to": "F4", "clutch_energy_j": {"F3": []}})"),
+              place + "clutch_energy_j.F3 = []; must be a number or null");
+    EXPECT_EQ(refused(R"({"from": "F3", "to": "F4", "clutch_energy_j": {"F3": null}})"), "accepted");
 }
 
 TEST_F(ResultFiles, WrongOnesAreRefusedInOneLine) {

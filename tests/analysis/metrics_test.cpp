@@ -136,6 +136,18 @@ TEST(Metrics, SlipTimeOfThePairsThatShouldHold) {
     EXPECT_EQ(only_shift(synthetic).find("slip_time_s.B"), nullptr);
 }
 
+TEST(Metrics, WhatSelectsTheOnlyGearIsNoPairThatShouldHold) {
+    SyntheticRun synthetic = driving_in_a();
+    synthetic.run.machine.gear_paths.resize(1);
+    synthetic.set("clutch.A.engagement", step(5, 0, 1)).set("clutch.A.state", step(5.5, slipping, locked));
+    synthetic.set_input_speed(ramp(5, 5.5, 200, 120));
+    const ShiftScore shift = only_shift(synthetic);
+    EXPECT_EQ(shift.shift.label(), "N->A");
+    EXPECT_EQ(shift.find("slip_time_s.A"), nullptr);
+    EXPECT_EQ(shift.find("slip_time_s.Fc"), nullptr);
+    EXPECT_NE(shift.find("slip_time_s.Fw"), nullptr);
+}
+
 TEST(Metrics, FillTimeIsFromTheCommandToTheKissPoint) {
     EXPECT_NEAR(metric(upshift(), "fill_time_s"), 0.1, 1e-9);
 }
@@ -161,6 +173,44 @@ TEST(Metrics, FlareIsTheExcessOverBothGears) {
     synthetic.set_input_speed(input);
     synthetic.set("clutch.A.slip", [input](double t) { return input(t) - 120; });
     synthetic.set("clutch.B.slip", [input](double t) { return input(t) - 90; });
+    EXPECT_NEAR(metric(synthetic, "flare_rad_s"), 7, 1e-9);
+}
+
+// The input runs 7 rad/s above gear A's speed, whichever end of a clutch the model calls a, and on which side of
+// its gear the clutch sits.
+TEST(Metrics, FlareDoesNotDependOnHowTheModelWritesItsClutches) {
+    const Formula input = [](double t) {
+        return t < 5.3 ? 120 : t < 5.35 ? 127. : ramp(5.35, 5.7, 127, 90)(t);
+    };
+    for (const char* turned : {"", "A", "B", "AB"}) {
+        for (const double direction : {1., -1.}) {
+            SyntheticRun synthetic = upshift();
+            const auto set_slip = [&](const std::string& name, double old_speed) {
+                const bool turn = std::string(turned).find(name) != std::string::npos;
+                for (plant::Clutch& clutch : synthetic.run.machine.clutches) {
+                    if (turn && clutch.name == name) std::swap(clutch.a, clutch.b);
+                }
+                synthetic.set("clutch." + name + ".slip",
+                              [=](double t) { return (turn ? -1 : 1) * direction * (input(t) - old_speed); });
+            };
+            set_slip("A", 120);
+            set_slip("B", 90);
+            synthetic.set_input_speed([=](double t) { return direction * input(t); });
+            synthetic.set("mass.output.speed", direction * 30);
+            EXPECT_NEAR(metric(synthetic, "flare_rad_s"), 7, 1e-9) << turned << " " << direction;
+            EXPECT_NEAR(metric(synthetic, "inertia_phase_s"), 5.69 - 5.3, 0.02) << turned;
+        }
+    }
+    SyntheticRun synthetic = upshift();
+    for (plant::Gear& gear : synthetic.run.machine.gears) {
+        if (gear.name == "b") gear.a = "input", gear.b = "pinion_b";
+    }
+    for (plant::Clutch& clutch : synthetic.run.machine.clutches) {
+        if (clutch.name == "B") clutch.a = "pinion_b", clutch.b = "output";
+    }
+    synthetic.set_input_speed(input);
+    synthetic.set("clutch.A.slip", [input](double t) { return input(t) - 120; });
+    synthetic.set("clutch.B.slip", [input](double t) { return input(t) / 3 - 30; });
     EXPECT_NEAR(metric(synthetic, "flare_rad_s"), 7, 1e-9);
 }
 

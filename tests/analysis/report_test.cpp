@@ -64,16 +64,20 @@ TEST(Report, HoldsNoReferenceToAnotherHost) {
         EXPECT_EQ(html.find(attribute), std::string::npos) << attribute;
 }
 
-TEST(Report, EnergyTableIsTheLedgersLastRow) {
+// The recording begins when 40 J have gone in already: what the table tells adds up all the same.
+TEST(Report, EnergyTableIsTheChangeOfTheLedgerFromTheFirstRowToTheLast) {
     auto run = long_run(3);
-    run.columns.push_back({{"energy.input", plant::Unit::joule, 0, 0, 0, ""}, {0, 5, 10}});
+    run.columns.push_back({{"energy.input", plant::Unit::joule, 0, 0, 0, ""}, {40, 45, 50}});
     run.columns.push_back({{"energy.stored", plant::Unit::joule, 0, 0, 0, ""}, {100, 102, 104}});
-    run.columns.push_back({{"energy.dissipated", plant::Unit::joule, 0, 0, 0, ""}, {0, 3, 6}});
-    run.columns.push_back({{"clutch.F2.heat", plant::Unit::joule, 0, 0, 0, ""}, {0, 2, 4}});
+    run.columns.push_back({{"energy.dissipated", plant::Unit::joule, 0, 0, 0, ""}, {20, 23, 26.5}});
+    run.columns.push_back({{"energy.defect", plant::Unit::joule, 0, 0, 0, ""}, {1, 1.25, 1.5}});
+    run.columns.push_back({{"clutch.F2.heat", plant::Unit::joule, 0, 0, 0, ""}, {7, 9, 11}});
     const std::string html = analysis::report_html(run, nlohmann::json::array(), {"title", "<svg/>"});
     EXPECT_NE(html.find(R"("input_j":10.0)"), std::string::npos);
     EXPECT_NE(html.find(R"("stored_change_j":4.0)"), std::string::npos);
+    EXPECT_NE(html.find(R"("dissipated_total_j":6.5)"), std::string::npos);
     EXPECT_NE(html.find(R"("dissipated_j":{"F2":4.0})"), std::string::npos);
+    EXPECT_NE(html.find(R"("defect_j":0.5)"), std::string::npos);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "analysis/gears.h"
+#include "io/input_error.h"
 #include "tests/analysis/synthetic_run.h"
 
 namespace shiftrig::analysis {
@@ -202,6 +203,43 @@ TEST(Shifts, TwoInSuccessionAreToldApartAndTheFirstSettlesUntilTheSecondIsAskedF
     EXPECT_EQ(shifts[1].kind, ShiftKind::power_downshift);
     EXPECT_NEAR(synthetic.run.time[shifts[0].settled], 6.0, 1e-9);
     EXPECT_NEAR(shifts[1].duration(), 0.4, 1e-9);
+}
+
+// `count` gears before A that nobody engages, each with a clutch of its own.
+SyntheticRun upshift_beside_other_gears(int count) {
+    SyntheticRun synthetic = upshift();
+    plant::Description& machine = synthetic.run.machine;
+    std::vector<plant::GearPath> paths;
+    for (int i = 0; i < count; ++i) {
+        plant::Clutch clutch = machine.clutches[1];
+        clutch.name = "X" + std::to_string(i);
+        machine.clutches.push_back(clutch);
+        paths.push_back({clutch.name, {"Fc", clutch.name}});
+    }
+    paths.insert(paths.end(), machine.gear_paths.begin(), machine.gear_paths.end());
+    machine.gear_paths = paths;
+    return synthetic;
+}
+
+TEST(Shifts, AreToldApartAmongMoreGearsThanAWordHasBits) {
+    const std::vector<Shift> shifts = find_shifts(upshift_beside_other_gears(64).run);
+    ASSERT_EQ(shifts.size(), 1u);
+    EXPECT_EQ(shifts[0].label(), "A->B");
+    EXPECT_EQ(shifts[0].oncoming, Names{"B"});
+    EXPECT_EQ(shifts[0].offgoing, Names{"A"});
+}
+
+TEST(Shifts, MoreSelectingClutchesThanCanBeToldApartAreRefused) {
+    EXPECT_EQ(find_shifts(upshift_beside_other_gears(253).run).size(), 1u);
+    try {
+        find_shifts(upshift_beside_other_gears(254).run);
+        FAIL();
+    } catch (const io::InputError& error) {
+        EXPECT_STREQ(
+            error.what(),
+            "model \"small machine\": gear_paths: more than 256 clutches select gears; shifts cannot "
+            "be told apart");
+    }
 }
 
 TEST(Shifts, RunWithoutGearPathsHasNone) {

@@ -63,6 +63,19 @@ class BadInput(InAFolder):
         self.assertRegex(done.stderr, pattern)
         self.assertEqual(done.stdout, "")
 
+    def test_a_picture_of_a_time_that_the_recording_does_not_have(self):
+        recording, picture = self.path("short.lcmlog"), self.path("picture.svg")
+        free("--duration", "0.5", "--record", recording)
+
+        def plot(*window):
+            return subprocess.run([SHIFTRIG, "plot", recording, "-o", picture, *window], capture_output=True, text=True)
+
+        for window in (["--from", "50", "--until", "60"], ["--from", "50"], ["--from", "0.2001", "--until", "0.2002"]):
+            self.assert_one_line(plot(*window),
+                                 r"short\.lcmlog: no two ticks between [\d.]+ s and [\d.]+ s; it is from 0\.001 s to 0\.500 s$")
+            self.assertFalse(os.path.exists(picture))
+        self.assertEqual(plot("--from", "0.2").returncode, 0)
+
     def test_wrong_key(self):
         path, line = self.tractor_with("outer_radius_m", "outer_radius_mm")
         self.assert_one_line(run(path), re.escape(path) + ":%d:.*outer_radius_mm" % line)

@@ -5,6 +5,7 @@ All pass with the reference controller; with the bad calibration shipped beside 
 runs that gave up, are not finite or could not be kept whole fail whatever was expected of them; the JUnit file
 parses and agrees; a broken expectation is one line with scenario, time, signal, expected, found."""
 import glob
+import json
 import os
 import re
 import resource
@@ -60,6 +61,11 @@ def scenario(name, text):
     return path
 
 
+# What the reader of the documentation tries first.
+example = re.search(r"(?s)```yaml\n(.*?)```", open("docs/scenario-files.md").read())[1]
+tried = run(scenario("example", example.replace("../tractor.yaml", os.path.abspath("config/tractor.yaml"))))
+check("the example of docs/scenario-files.md holds", tried.returncode == 0, tried.stdout + tried.stderr)
+
 # A `must_not` alone is kept by every run that does nothing: by one that gave up and by one that is not finite.
 shift = open("config/scenarios/plough_upshift.yaml").read().replace("../tractor.yaml", os.path.abspath("config/tractor.yaml"))
 only_must_not = re.sub(r"(?s)^expect:.*", "expect:\n  must_not:\n    - {kind: engine_stalls}\n", shift, flags=re.M)
@@ -86,8 +92,45 @@ check("a run whose events did not all fit cannot be judged",
       crowd.returncode == 2 and "crowd.yaml: the run's events do not fit the memory: 44 too many\n" in crowd.stdout,
       crowd.stdout + crowd.stderr)
 
+misspelt = run(scenario("misspelt", only_must_not + "    - {kind: lock, device: F22}\n"))
+check("a device that the model does not have is one line and exit code 2, not kept by every run",
+      misspelt.returncode == 2 and re.search(r"misspelt\.yaml:\d+:7: expect: lock of F22: no device of this model has "
+                                             r"events by that name; nearest: F2\n", misspelt.stdout),
+      misspelt.stdout + misspelt.stderr)
+
 recordings = os.path.join(folder, "recordings")
 os.mkdir(recordings)
+os.mkdir(os.path.join(folder, "b"))
+other = scenario("b/shift", only_must_not)
+same_name = run(shift, other, "--record", recordings, "--jobs", "2")
+check("two scenarios that would be recorded in one file are refused",
+      same_name.returncode == 2 and same_name.stderr ==
+      f"shiftrig: --record: scenarios {shift} and {other} would both be recorded as shift.lcmlog\n"
+      and not os.listdir(recordings), same_name.stdout + same_name.stderr)
+check("without --record they are run", run(shift, other).returncode == 0)
+respelt = os.path.join(folder, ".", "shift.yaml")
+twice = run(shift, respelt)
+check("one scenario under two spellings is one given twice",
+      twice.returncode == 2 and twice.stderr == f"shiftrig: scenario {respelt} is given twice\n", twice.stdout + twice.stderr)
+
+good, worse = os.path.join(folder, "good.json"), os.path.join(folder, "bad.json")
+for path, words, status in ((good, [], 0), (worse, ["--controller", "builtin:config/calibration/bad.yaml"], 1)):
+    tested = run("config/scenarios/plough_upshift.yaml", "config/scenarios/creep.yaml", "--json", *words)
+    check("--json ends as without it", tested.returncode == status, tested.stdout + tested.stderr)
+    with open(path, "w") as file:
+        file.write(tested.stdout)
+first = json.load(open(good))["runs"][0]
+check("--json says of each scenario whether it passed, and of each shift the scorecard",
+      first["scenario"] == "config/scenarios/plough_upshift.yaml" and first["passed"] and first["failures"] == []
+      and [(s["from"], s["to"], s["verdicts"]["duration_s"]) for s in first["shifts"]] == [("F2", "F3", "good")], first)
+check("and why it failed", not json.load(open(worse))["runs"][0]["passed"] and json.load(open(worse))["runs"][0]["failures"])
+compared = subprocess.run([shiftrig, "compare", good, worse], capture_output=True, text=True)
+check("compare reads both and finds what got worse",
+      compared.returncode == 1 and re.search(r"^plough_upshift F2->F3: .*, worse$", compared.stdout, re.M),
+      compared.stdout + compared.stderr)
+check("and nothing where nothing changed",
+      subprocess.run([shiftrig, "compare", good, good], capture_output=True).returncode == 0)
+
 lost = run(shift, "--record", recordings, restore_signals=False,  # SIGXFSZ stays ignored: the write fails instead
            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, 1 << 20)))
 check("a recording that is cut short by its disk is told and fails",

@@ -186,5 +186,36 @@ TEST(ScenarioFile, AMomentThatDoesNothingIsRefused) {
     EXPECT_EQ(refusal(head + "timeline:\n  - {at_s: 5.999, over_s: 3, driver.throttle: 1}\n"), "");
 }
 
+// Such an expectation would hold whatever happens.
+TEST(ScenarioFile, AnEventIsExpectedInAWindowThatHasTimeInIt) {
+    const std::string place = "config/scenarios/s.yaml:4:14: expect: lock from_s = ";
+    EXPECT_EQ(refusal(head + "expect:\n  must_not: [{kind: lock, from_s: 5, until_s: 2}]\n"),
+              place + "5; must be below until_s = 2");
+    EXPECT_EQ(refusal(head + "expect:\n  must_not: [{kind: lock, from_s: 2, until_s: 2}]\n"),
+              place + "2; must be below until_s = 2");
+    EXPECT_EQ(refusal(head + "expect:\n  must_not: [{kind: lock, from_s: 20}]\n"),
+              place + "20; must be below duration_s = 6");
+    EXPECT_EQ(refusal(head + "expect:\n  must_not: [{kind: lock, from_s: 5.5, until_s: 20}]\n"), "");
+}
+
+TEST(ScenarioFile, ADeviceThatTellsNoEventsIsNamedWithItsNeighbour) {
+    const auto device_refusal = [](const std::string& event) -> std::string {
+        try {
+            check_devices(parse_scenario(head + "expect:\n  must_not: [{" + event + "}]\n", "s.yaml"),
+                          {"Fc", "F2", "pinion_2"});
+            return "";
+        } catch (const InputError& error) {
+            return error.what();
+        }
+    };
+    EXPECT_EQ(device_refusal("kind: lock, device: F2"), "");
+    EXPECT_EQ(device_refusal("kind: lock"), "");
+    EXPECT_EQ(
+        device_refusal("kind: lock, device: F22"),
+        "s.yaml:4:14: expect: lock of F22: no device of this model has events by that name; nearest: F2");
+    EXPECT_EQ(device_refusal("kind: safe_command, device: F2"),
+              "s.yaml:4:14: expect: safe_command is of no device: it is the bench's own");
+}
+
 }  // namespace
 }  // namespace shiftrig::io
