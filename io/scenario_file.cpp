@@ -39,8 +39,9 @@ int line_of(const ReadContext& context, const std::string& key) {
 // An event is looked for in its window: one without time in it would forbid nothing.
 void check_window(const std::string& path, const ExpectedEvent& event, double duration) {
     const auto refuse = [&](double from, const std::string& rule) {
-        throw InputError(path, event.line, event.column,
-                         "expect: " + event.kind + " from_s = " + in_digits(from) + "; must be below " + rule);
+        throw InputError(
+            path, event.line, event.column,
+            "expect: " + event.kind + " from_s = " + in_digits(from) + "; must be below " + rule);
     };
     const auto [from, until] = event.window;
     if (!(from < until)) refuse(from, "until_s = " + in_digits(until));

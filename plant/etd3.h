@@ -11,6 +11,14 @@ void advance(Work& work, const Mode& mode, double end_fraction) SHIFTRIG_REALTIM
 
 // Coordinates half way through the part just computed: the step's own solution, which is exact for forces on the parabola
 // through its three.
-void coordinates_half_way(Work& work, const Mode& mode, double* coordinates) SHIFTRIG_REALTIME;
+inline void coordinates_half_way(Work& w, const Mode& mode, double* coordinates) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    const ScratchData& s = w.scratch;
+    double* const change = s.vector_b;
+    m.kernel.loops.subtract(s.half.f, s.begin().f, m.forces, change);
+    m.kernel.loops.subtract(s.late.f, s.begin().f, m.forces, change + m.forces);
+    m.kernel.multiply(s.used.middle, padded(mode.order), 2 * m.forces, change, s.half.f - mode.order,
+                      coordinates);
+}
 
 }  // namespace shiftrig::plant::detail

@@ -54,10 +54,6 @@ struct Mode {
     double* view = nullptr;            // E and all slips   panels, seen × order
     double* mobility = nullptr;        // B                 panels, masses × masses
     double* rates = nullptr;           // [L S̃]             panels, states × (order + forces)
-    // The same of the coordinates in energy variables, padded(order) × (order + forces), and ‖L‖₁ of these [1/s].
-    double* scaled_rates = nullptr;
-    double rate_norm = 0;
-    double* energy_root = nullptr;  // per coordinate, its scale in energy variables, then the reciprocals
     double* torques =
         nullptr;  // [R_q R_f]         panels, (rows + translating) × (order + forces); the latter
                   //                   are accelerations
@@ -67,6 +63,10 @@ struct Mode {
     int ledger_parts = 1;  // into how many parts the ledger divides a step: stiff shafts swing within it
     StepOperators ledger;  // for one of them
     double *step_memory = nullptr, *ledger_memory = nullptr;
+    // [L S̃] of the coordinates in energy variables, padded(order) × (order + forces), ‖L‖₁ of these [1/s], and per coordinate
+    // its scale, then the reciprocals: from these the operators of any length are built.
+    double *scaled_rates = nullptr, *energy_root = nullptr;
+    double rate_norm = 0;
     TreeMode* tree = nullptr;  // instead of all matrices, on the engine for long chains
 };
 

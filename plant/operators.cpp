@@ -83,13 +83,13 @@ void OperatorsData::place_matrices(const ModelData& m) {
         mode.view = take(sizes.view);
         mode.mobility = take(sizes.mobility);
         mode.rates = take(sizes.rates);
-        mode.scaled_rates = take(sizes.scaled_rates);
-        mode.energy_root = take(sizes.energy_root);
         mode.torques = take(sizes.torques);
         mode.force_torques = take(sizes.force_torques);
         mode.balance = take(sizes.balance);
         mode.step_memory = take(sizes.operators);
         mode.ledger_memory = take(sizes.operators);
+        mode.scaled_rates = take(sizes.scaled_rates);
+        mode.energy_root = take(sizes.energy_root);
     }
 }
 
