@@ -214,17 +214,18 @@ class Meter {
         return time_while(shift_.asked, shift_.settled,
                           [&](Row i) { return std::abs((*on)[i]) > least && std::abs((*off)[i]) > least; });
     }
-    // From where the offgoing clutches let the speeds leave the old ratio (their slip exceeds 2 % of the input's speed)
-    // to t_e.
+    // From where the offgoing clutches let the speeds leave the old ratio (what their slip makes of the input's speed
+    // exceeds 2 % of it) to t_e.
     Value inertia_phase() const {
         if (!shift_.completed() || shift_.offgoing.empty()) return {};
         std::optional<Row> leaves;
         for (const std::string& name : shift_.offgoing) {
             const Values* slip = clutch(name, "slip");
             const Values* speed = input_speed();
-            if (slip == nullptr || speed == nullptr) return {};
+            const Value per = slip_per_input(name);
+            if (slip == nullptr || speed == nullptr || !per) return {};
             const auto row = first_row(shift_.asked, shift_.ended, [&](Row i) {
-                return std::abs((*slip)[i]) > 0.02 * std::max(std::abs((*speed)[i]), 0.5);
+                return std::abs((*slip)[i] / *per) > 0.02 * std::max(std::abs((*speed)[i]), 0.5);
             });
             if (row) leaves = std::min(leaves.value_or(*row), *row);
         }

@@ -6,8 +6,6 @@
 #include <optional>
 #include <variant>
 
-#include "io/input_error.h"
-
 namespace shiftrig::analysis {
 
 namespace {
@@ -47,8 +45,7 @@ CommandSignal command_of(const plant::Clutch& clutch) {
 }
 
 // One bit per clutch that selects gears.
-constexpr std::size_t most_selectors = 256;
-using Clutches = std::bitset<most_selectors>;
+using Clutches = std::bitset<plant::Description::most_selectors>;
 
 // A gear with the columns its ratio is read from.
 struct GearView {
@@ -110,10 +107,6 @@ class Finder {
     Clutches bit_of(const std::string& name) {
         const auto place = std::find(selectors_.begin(), selectors_.end(), name);
         const auto number = static_cast<std::size_t>(place - selectors_.begin());
-        if (number >= most_selectors)
-            throw io::InputError("model \"" + run_.machine.name + "\": gear_paths: more than " +
-                                 std::to_string(most_selectors) +
-                                 " clutches select gears; shifts cannot be told apart");
         const Clutches bit = Clutches{}.set(number);
         if (place != selectors_.end()) return bit;
         selectors_.push_back(name);

@@ -299,7 +299,7 @@ void fields(Fields& f, plant::BrixiusTyre& t) {
     f.link("wheel", t.wheel, "rotating mass");
     f.link("body", t.body, "translating mass");
     f.number("radius_m", t.radius, positive, "rolling radius");
-    f.number("mobility_number", t.mobility_number, at_least_one,
+    f.number("mobility_number", t.mobility_number, {plant::softest_soil, plant::hardest_soil},
              "Brixius Bn: about 80 hard, 55 firm, 40 tilled, 20 soft; the input "
              "environment.mobility_number is that of the first tyre and changes the others in proportion");
     f.number("relaxation_length_m", t.relaxation_length, positive, "way the force takes to follow the slip");

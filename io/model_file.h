@@ -56,6 +56,12 @@ struct ModelFile {
     std::vector<Place> places;
 };
 
+// To assign over a file that has a stanza `can:` would write into that very node, and so into all copies of it.
+inline void replace(ModelFile& file, ModelFile by) {
+    file.can.reset();
+    file = std::move(by);
+}
+
 // Throws InputError.
 ModelFile read_model(const std::string& path);
 ModelFile parse_model(const std::string& text, const std::string& path);

@@ -90,6 +90,7 @@ struct Description {
     std::vector<SpeedSensor> sensors;
     std::optional<Oil> oil;
     std::vector<GearPath> gear_paths;
+    static constexpr std::size_t most_selectors = 256;  // clutches that these name in all
     std::string input_mass, output_mass;  // of the gear table's ratio and of statics
     double gravity = 9.80665;             // [m/s²]
 

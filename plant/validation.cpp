@@ -1,6 +1,7 @@
 #include "plant/validation.h"
 
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -113,6 +114,12 @@ void validate(const Description& d) {
             throw ModelError("model", d.name, field,
                              "= " + std::to_string(value) + "; must be within 1 and " + std::to_string(most));
     };
+    std::set<std::string> selectors;
+    for (const GearPath& path : d.gear_paths) selectors.insert(path.closed.begin(), path.closed.end());
+    if (selectors.size() > Description::most_selectors)
+        throw ModelError("model", d.name, "gear_paths",
+                         "name " + std::to_string(selectors.size()) + " clutches; must be " +
+                             std::to_string(Description::most_selectors) + " at most");
     between_one_and(Description::most_events, "maximum_events", d.maximum_events);
     between_one_and(Description::most_parts, "maximum_parts", d.maximum_parts);
     if (d.oil) {

@@ -141,7 +141,7 @@ class Brancher {
         set_keys(values);
         if (rebuilds_) {
             Setup setup = setup_;
-            setup.model = io::parse_model(model_->text(), snapshot_.model_path);
+            io::replace(setup.model, io::parse_model(model_->text(), snapshot_.model_path));
             for (const auto& [gear, option] : snapshot_.overrides)
                 io::select_option(setup.model.description, gear, option);
             rig_ = std::make_unique<Rig>(std::move(setup));

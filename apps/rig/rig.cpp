@@ -225,7 +225,7 @@ void Rig::take_requests() SHIFTRIG_REALTIME {
 
 plant::Model Rig::build_changed(Setup& changed, io::ModelFile file) const {
     changed = setup_;
-    changed.model = std::move(file);
+    io::replace(changed.model, std::move(file));
     changed = with_options(std::move(changed));
     plant::Model model = build(changed);
     if (model.state_size() != model_.state_size())
@@ -242,7 +242,7 @@ void Rig::check_machine(io::ModelFile file) const {
 void Rig::change_machine(io::ModelFile file) {
     Setup changed;
     model_ = build_changed(changed, std::move(file));
-    setup_.model = std::move(changed.model);
+    io::replace(setup_.model, std::move(changed.model));
     operators_ = plant::Operators(model_);
     scratch_ = plant::Scratch(model_);
 }

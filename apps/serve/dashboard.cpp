@@ -10,8 +10,10 @@
 #include <optional>
 
 #include "analysis/report/shift_page.h"
+#include "apps/rig/timeline.h"
 #include "apps/rig/variation.h"
 #include "apps/serve/machine_page.h"
+#include "io/signals.h"
 
 namespace shiftrig::serve {
 
@@ -309,7 +311,15 @@ std::string Dashboard::command(std::string_view verb, const std::string& text) {
         if (auto wrong = number_in(body, "value", value); !wrong.empty()) return wrong;
         const std::string name = body["signal"].get<std::string>();
         const std::lock_guard lock(mutex_);
-        if (!rig_.request(rig_.signals().find(name), value)) return "signal \"" + name + "\" cannot be set";
+        const int index = rig_.signals().find(name);
+        if (index >= 0) {
+            const std::string wanted = name + " = " + io::in_digits(value) + "; ";
+            const io::Rule rule = io::rule_of(rig_.signals().signal(index));
+            if (!rule.holds(value)) return wanted + rule.words();
+            if (rig::takes_whole_numbers(name) && value != std::floor(value))
+                return wanted + "must be a whole number";
+        }
+        if (!rig_.request(index, value)) return "signal \"" + name + "\" cannot be set";
         return "";
     }
     if (verb == "fault") {

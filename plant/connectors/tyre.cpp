@@ -10,10 +10,9 @@ namespace shiftrig::plant {
 
 void check_parameters(const Check& check, const BrixiusTyre& t) {
     check.positive("radius", t.radius);
-    // As the input environment.mobility_number has it.
-    if (!(t.mobility_number >= 1))
-        check.fail("mobility_number", "= " + number(t.mobility_number) + "; must be >= 1");
-    check.any("mobility_number", t.mobility_number);
+    if (!(t.mobility_number >= softest_soil && t.mobility_number <= hardest_soil))
+        check.fail("mobility_number", "= " + number(t.mobility_number) + "; must be within " +
+                                          number(softest_soil) + " and " + number(hardest_soil));
     check.positive("relaxation_length", t.relaxation_length);
     check.not_negative("slip_damping_time", t.slip_damping_time);
     check.positive("weight", t.weight);
@@ -45,8 +44,9 @@ void add_law(detail::ModelBuilder& builder, const BrixiusTyre& t) {
     law.body = m.structure.mass(t.body);
     law.wheel_force = builder.external(law.wheel);
     law.body_force = builder.external(law.body);
-    law.mobility = builder.input("environment.mobility_number", Unit::one, t.mobility_number, 1, 1e4,
-                                 "Brixius number of the soil under the first tyre; others in proportion");
+    law.mobility =
+        builder.input("environment.mobility_number", Unit::one, t.mobility_number, softest_soil, hardest_soil,
+                      "Brixius number of the soil under the first tyre; others in proportion");
     law.share = t.mobility_number / m.description.tyres.front().mobility_number;
     law.resistance = builder.pair(t.body + ".resistance");
     m.tyres.push_back(law);

@@ -24,6 +24,9 @@ struct BrixiusTyre {
     // The rest of the motion resistance acts on the body as a friction device (1/Bn + 0.5|s|/√Bn)·W.
 };
 
+// Within these the input environment.mobility_number may move.
+constexpr double softest_soil = 1, hardest_soil = 1e4;
+
 // ---- what it answers (connector.h)
 
 inline const char* kind(const BrixiusTyre&) {

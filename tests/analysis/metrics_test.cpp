@@ -212,6 +212,17 @@ TEST(Metrics, FlareDoesNotDependOnHowTheModelWritesItsClutches) {
     synthetic.set("clutch.A.slip", [input](double t) { return input(t) - 120; });
     synthetic.set("clutch.B.slip", [input](double t) { return input(t) / 3 - 30; });
     EXPECT_NEAR(metric(synthetic, "flare_rad_s"), 7, 1e-9);
+
+    // And the offgoing one behind its gear, where it slips at a quarter of what the input makes of it.
+    for (plant::Gear& gear : synthetic.run.machine.gears) {
+        if (gear.name == "a") gear.a = "input", gear.b = "pinion_a";
+    }
+    for (plant::Clutch& clutch : synthetic.run.machine.clutches) {
+        if (clutch.name == "A") clutch.a = "pinion_a", clutch.b = "output";
+    }
+    synthetic.set("clutch.A.slip", [input](double t) { return input(t) / 4 - 30; });
+    EXPECT_NEAR(metric(synthetic, "flare_rad_s"), 7, 1e-9);
+    EXPECT_NEAR(metric(synthetic, "inertia_phase_s"), 5.69 - 5.3, 0.02);
 }
 
 TEST(Metrics, TieUpIsTheTorqueOfTheOffgoingClutchAgainstItsDirection) {

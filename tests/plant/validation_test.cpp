@@ -59,6 +59,23 @@ TEST(Validation, OnePedalHasOnePosition) {
               "clutch \"rear\": initial = 0; must be that of \"front\", which the same pedal applies");
 }
 
+// The scorecard tells the clutches of gears apart in sets of this size.
+TEST(Validation, GearPathsNameNoMoreClutchesThanCanBeToldApart) {
+    Description d;
+    d.masses = {mass("left", 1)};
+    const auto with_gears = [&](int count) {
+        d.gear_paths.clear();
+        for (int k = 0; k < count; ++k) {
+            const std::string name = "K" + std::to_string(k);
+            if (static_cast<int>(d.clutches.size()) <= k) d.clutches.push_back(clutch(name, "left", "", 1));
+            d.gear_paths.push_back({name, {name}});
+        }
+        return refusal(d);
+    };
+    EXPECT_EQ(with_gears(256), "");
+    EXPECT_EQ(with_gears(257), "model \"\": gear_paths name 257 clutches; must be 256 at most");
+}
+
 // ---- oil --------------------------------------------------------------------------------------------
 
 std::string oil_refusal(double Oil::*field, double value) {
