@@ -91,8 +91,8 @@ struct Description {
     std::optional<Oil> oil;
     std::vector<GearPath> gear_paths;
     static constexpr std::size_t most_selectors = 256;  // clutches that these name in all
-    std::string input_mass, output_mass;  // of the gear table's ratio and of statics
-    double gravity = 9.80665;             // [m/s²]
+    std::string input_mass, output_mass;                // of the gear table's ratio and of statics
+    double gravity = 9.80665;                           // [m/s²]
 
     Transition transition = Transition::localised;
     Method method = Method::automatic;
