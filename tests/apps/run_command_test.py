@@ -15,6 +15,8 @@ import threading
 import time
 import unittest
 
+from in_a_folder import Folder
+
 SHIFTRIG, TCU, CONFIG = sys.argv[1:4]
 SHIFT = CONFIG + "/scenarios/plough_upshift.yaml"
 MULTICAST = os.path.dirname(os.path.abspath(__file__)) + "/../io/with_multicast.sh"
@@ -35,15 +37,7 @@ def free(*arguments, scenario=SHIFT):
     return json.loads(done.stdout.splitlines()[-1])
 
 
-class InAFolder(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-
-    def path(self, name):
-        return os.path.join(self.folder, name)
-
+class InAFolder(Folder):
     def tractor_with(self, old, new):
         """The tractor's file, changed in one place; returns its path and the line of the change."""
         with open(CONFIG + "/tractor.yaml") as file:

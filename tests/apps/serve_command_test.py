@@ -9,12 +9,13 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import unittest
 import urllib.error
 import urllib.request
+
+from in_a_folder import Folder
 
 SHIFTRIG, CONFIG = sys.argv[1:3]
 TRACTOR = CONFIG + "/tractor.yaml"
@@ -46,15 +47,7 @@ class Served:
         return self.process.returncode, out, err
 
 
-class Serve(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-
-    def path(self, name):
-        return os.path.join(self.folder, name)
-
+class Serve(Folder):
     def assert_sound(self, recording):
         """It replays to its end; returns how many ticks."""
         done = subprocess.run([SHIFTRIG, "replay", recording, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -54,6 +54,16 @@ void expect_same_tick(const Rig& whole, const Rig& continued) {
                   explain(continued.signals(), continued.rig_events()[i]));
 }
 
+// The whole run first catches up with the one that continues a snapshot.
+void expect_same_ticks(Rig& whole, Rig& continued, int ticks) {
+    while (whole.ticks() < continued.ticks()) whole.tick();
+    for (int tick = 0; tick < ticks; ++tick) {
+        whole.tick();
+        continued.tick();
+        ASSERT_NO_FATAL_FAILURE(expect_same_tick(whole, continued));
+    }
+}
+
 class Continued : public testing::TestWithParam<double> {};
 
 TEST_P(Continued, RunEqualsTheUninterruptedOneBitForBit) {
@@ -62,12 +72,7 @@ TEST_P(Continued, RunEqualsTheUninterruptedOneBitForBit) {
     const io::Manifest snapshot = io::read_snapshot(file.path);
     Rig continued(setup_of(snapshot)), whole(setup_for("plough_upshift"));
     resume(continued, snapshot);
-    while (whole.ticks() < continued.ticks()) whole.tick();
-    for (int tick = 0; tick < 2000; ++tick) {
-        whole.tick();
-        continued.tick();
-        ASSERT_NO_FATAL_FAILURE(expect_same_tick(whole, continued));
-    }
+    expect_same_ticks(whole, continued, 2000);
 }
 
 // Before, in the fill, in the torque phase and in the inertia phase of the shift.
@@ -141,12 +146,7 @@ TEST(Snapshot, HoldsItsCalibration) {
     const io::Manifest snapshot = io::read_snapshot(file.path);
     Rig continued(setup_of(snapshot)), whole(setup);
     resume(continued, snapshot);
-    while (whole.ticks() < continued.ticks()) whole.tick();
-    for (int tick = 0; tick < 500; ++tick) {
-        whole.tick();
-        continued.tick();
-        ASSERT_NO_FATAL_FAILURE(expect_same_tick(whole, continued));
-    }
+    expect_same_ticks(whole, continued, 500);
 }
 
 TEST(Snapshot, WithoutItsCalibrationIsRefused) {
