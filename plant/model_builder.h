@@ -22,6 +22,15 @@ class ModelBuilder {
     int flag(const std::string& name, const std::string& description);
     void output(const std::string& name, Unit unit, const std::string& description);
 
+    // What acts on this mass, its speed and its way: Nm, rad/s and rad, or N, m/s and m where it moves straight on.
+    Unit effort_unit(const std::string& mass) const {
+        return is_straight(mass) ? Unit::newton : Unit::newton_metre;
+    }
+    Unit speed_unit(const std::string& mass) const {
+        return is_straight(mass) ? Unit::metre_per_second : Unit::radian_per_second;
+    }
+    Unit way_unit(const std::string& mass) const { return is_straight(mass) ? Unit::metre : Unit::radian; }
+
     // Index and law of the friction pair that a device put into the structure under this name. −1: there is none.
     int pair(const std::string& name) const { return model.structure.pair(name); }
     PairLaw& law(int pair) { return model.pair_laws[static_cast<std::size_t>(pair)]; }
@@ -39,6 +48,12 @@ class ModelBuilder {
 
     int actuator_slots = 0;
     std::vector<std::string> tellers;
+
+  private:
+    bool is_straight(const std::string& mass) const {
+        const auto j = static_cast<std::size_t>(model.structure.mass(mass));
+        return model.description.masses[j].motion == Motion::translating;
+    }
 };
 
 }  // namespace shiftrig::plant::detail

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <sstream>
 
 #include "analysis/scorecard.h"
@@ -64,6 +65,7 @@ void SnapshotTaker::write(const std::string& path, const Rig& rig, const rt::Loo
     manifest.assembly = assembly_;
     const double at = 1e-9 * static_cast<double>(tick_ * manifest.tick_ns);
     if (rig.setup().buses.built_in) manifest.facts["calibration_text"] = rig.setup().buses.calibration_text;
+    manifest.facts["folder"] = std::filesystem::current_path().string();
     manifest.history = pack(run, analysis::scorecard_signals(run.machine), at);
     io::write_snapshot(path, manifest);
 }
@@ -83,6 +85,9 @@ Setup setup_of(const io::Manifest& snapshot) {
         const auto found = snapshot.facts.find(name);
         return found == snapshot.facts.end() ? std::string() : found->second;
     };
+    // What the model names beside it (CAN mapping, DBC) is looked for from where the snapshot was taken, if need be.
+    if (std::error_code ignored; !std::filesystem::exists(setup.model.path, ignored))
+        setup.model.path = (std::filesystem::path(fact("folder")) / setup.model.path).string();
     if (setup.scenario) follow_scenario(*setup.scenario, setup.buses);
     std::istringstream buses(fact("buses"));
     for (std::string name; buses >> name;) setup.buses.names.push_back(name);

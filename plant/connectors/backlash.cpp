@@ -23,8 +23,8 @@ void assemble(Assembly& assembly, const Backlash& b) {
 void name_outputs(detail::ModelBuilder& builder, const std::vector<Backlash>& backlashes) {
     for (const Backlash& b : backlashes) {
         const std::string prefix = "backlash." + b.name + ".";
-        builder.output(prefix + "torque", Unit::newton_metre, "torque on the first link");
-        builder.output(prefix + "twist", Unit::radian, "twist, 0 in the middle of the play");
+        builder.output(prefix + "torque", builder.effort_unit(b.a), "torque on the first link");
+        builder.output(prefix + "twist", builder.way_unit(b.a), "twist, 0 in the middle of the play");
         builder.output(prefix + "state", Unit::one, "0 open, +1 or -1 the flank that is closed");
     }
 }

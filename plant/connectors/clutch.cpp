@@ -227,21 +227,25 @@ void add_pair_law(detail::ModelBuilder& builder, const Clutch& c) {
 
 // One quantity of all devices after the other: loops write them so.
 void name_outputs(detail::ModelBuilder& builder, const std::vector<Clutch>& clutches) {
-    const auto each = [&](const char* quantity, Unit unit, const char* text, const auto& has) {
+    const auto each = [&](const char* quantity, const auto& unit, const char* text, const auto& has) {
         for (const Clutch& c : clutches) {
-            if (has(c)) builder.output("clutch." + c.name + quantity, unit, text);
+            if (has(c)) builder.output("clutch." + c.name + quantity, unit(c), text);
         }
     };
     const auto every = [](const Clutch&) { return true; };
-    each(".torque", Unit::newton_metre, "torque on the first link", every);
-    each(".slip", Unit::radian_per_second, "slip speed, first link minus second", every);
-    each(".capacity", Unit::newton_metre, "sliding capacity at the present slip", every);
-    each(".state", Unit::one, "0 locked, 1 slipping, 2 free", every);
-    each(".heat_power", Unit::watt, "friction power", every);
-    each(".heat", Unit::joule, "friction heat since start", every);
-    each(".pressure", Unit::pascal, "chamber pressure",
+    const auto always = [](Unit unit) { return [unit](const Clutch&) { return unit; }; };
+    const auto effort = [&](const Clutch& c) { return builder.effort_unit(c.a); };
+    const auto speed = [&](const Clutch& c) { return builder.speed_unit(c.a); };
+    each(".torque", effort, "torque on the first link", every);
+    each(".slip", speed, "slip speed, first link minus second", every);
+    each(".capacity", effort, "sliding capacity at the present slip", every);
+    each(".state", always(Unit::one), "0 locked, 1 slipping, 2 free", every);
+    each(".heat_power", always(Unit::watt), "friction power", every);
+    each(".heat", always(Unit::joule), "friction heat since start", every);
+    each(".pressure", always(Unit::pascal), "chamber pressure",
          [](const Clutch& c) { return std::holds_alternative<ActuationHydraulic>(c.actuation); });
-    each(".temperature", Unit::celsius, "facing surface", [](const Clutch& c) { return c.heat.has_value(); });
+    each(".temperature", always(Unit::celsius), "facing surface",
+         [](const Clutch& c) { return c.heat.has_value(); });
 }
 
 double* show(const detail::Shown& at, const std::vector<Clutch>& clutches, double* next) SHIFTRIG_REALTIME {

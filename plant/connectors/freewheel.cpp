@@ -33,8 +33,8 @@ void add_pair_law(detail::ModelBuilder& builder, const Freewheel& f) {
 void name_outputs(detail::ModelBuilder& builder, const std::vector<Freewheel>& freewheels) {
     for (const Freewheel& f : freewheels) {
         const std::string prefix = "freewheel." + f.name + ".";
-        builder.output(prefix + "torque", Unit::newton_metre, "torque on the first link");
-        builder.output(prefix + "slip", Unit::radian_per_second, "slip speed, first link minus second");
+        builder.output(prefix + "torque", builder.effort_unit(f.a), "torque on the first link");
+        builder.output(prefix + "slip", builder.speed_unit(f.a), "slip speed, first link minus second");
         builder.output(prefix + "state", Unit::one, "0 locked, 1 overloaded, 2 overrunning");
         builder.output(prefix + "heat_power", Unit::watt, "power of drag or overload");
         builder.output(prefix + "heat", Unit::joule, "heat of drag and overload since start");

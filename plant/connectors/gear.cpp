@@ -27,7 +27,7 @@ void assemble(Assembly& assembly, const Gear& g) {
 // One quantity of all gears after the other: loops write them so.
 void name_outputs(detail::ModelBuilder& builder, const std::vector<Gear>& gears) {
     for (const Gear& g : gears)
-        builder.output("gear." + g.name + ".torque", Unit::newton_metre,
+        builder.output("gear." + g.name + ".torque", builder.effort_unit(g.a),
                        "torque from the first link into the gear");
     for (const Gear& g : gears)
         builder.output("gear." + g.name + ".direction", Unit::one,

@@ -149,6 +149,25 @@ TEST(Snapshot, HoldsItsCalibration) {
     expect_same_ticks(whole, continued, 500);
 }
 
+// A model names its CAN files relative to itself, and may have been named relative to a folder that is not this one.
+TEST(Snapshot, FindsTheFilesOfItsModelFromAnyFolder) {
+    const TemporaryFile file("shiftrig_elsewhere.snap");
+    const auto here = std::filesystem::current_path();
+    std::filesystem::current_path(SHIFTRIG_SOURCE_DIR "/config");
+    Choices choices;
+    choices.scenario = "scenarios/plough_upshift.yaml";
+    write_snapshot_at(file.path, 0.1, make_setup(choices));
+    std::filesystem::current_path(std::filesystem::temp_directory_path());
+    const io::Manifest snapshot = io::read_snapshot(file.path);
+    EXPECT_FALSE(std::filesystem::path(snapshot.model_path).is_absolute()) << snapshot.model_path;
+    const auto setup = setup_of(snapshot);
+    std::filesystem::current_path(here);
+    Rig rig(setup);
+    resume(rig, snapshot);
+    rig.tick();
+    EXPECT_NEAR(rig.sim_time(), 0.101, 1e-9);
+}
+
 TEST(Snapshot, WithoutItsCalibrationIsRefused) {
     TemporaryFile file(".lcmlog");
     write_snapshot_at(file.path, 0.1);

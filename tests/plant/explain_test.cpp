@@ -173,6 +173,17 @@ TEST(Explain, ABodyThatMovesStraightOnHasForces) {
     Rig rig(d);
     const auto lines = told(rig, 0.5);
     EXPECT_NE(lines.back().find(", force 0.0 of 60.0 N static"), std::string::npos) << lines.back();
+
+    const auto unit = [&](const std::string& name) {
+        for (const Signal& output : rig.model.outputs()) {
+            if (output.name == name) return std::string(symbol(output.unit));
+        }
+        return "there is no " + name;
+    };
+    EXPECT_EQ(unit("clutch.skid.torque"), "N");
+    EXPECT_EQ(unit("clutch.skid.capacity"), "N");
+    EXPECT_EQ(unit("clutch.skid.slip"), "m/s");
+    EXPECT_EQ(unit("clutch.skid.heat"), "J");
 }
 
 // More brakes than a step can tell of close in the first one.
