@@ -79,6 +79,9 @@ struct LoopReport {
     Histogram lateness;  // wall pace: start − deadline of every slot, slept for or not, executed or skipped
     Histogram step;      // duration of the callable
     Histogram response;  // end of the callable − deadline
+
+    // Of a loop that went on where this one stopped: its outcome, sums of what both counted.
+    void add(const LoopReport& later);
 };
 
 // What other threads (and signal handlers) may ask of a running loop. It obeys within `longest_wait` and one tick, whatever

@@ -75,13 +75,11 @@ Dashboard::~Dashboard() {
 // ---- main thread ----------------------------------------------------------------------------------------
 
 rt::LoopReport Dashboard::run() {
-    rt::LoopReport report;
-    auto slots_left = options_.loop.slots;
-    do {
-        report = run_stretch(slots_left);
-        slots_left -= report.executed + report.skipped;
-        // A stretch ends early for stop(), for what waits, or because the loop gave up: only what waits goes on.
-    } while (report.outcome == rt::Outcome::stopped && !stopping_);
+    const std::int64_t slots = options_.loop.slots;
+    rt::LoopReport report = run_stretch(slots);
+    // A stretch ends early for stop(), for what waits, or because the loop gave up: only what waits goes on.
+    while (report.outcome == rt::Outcome::stopped && !stopping_)
+        report.add(run_stretch(slots - report.executed - report.skipped));
     return report;
 }
 

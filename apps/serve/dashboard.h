@@ -41,7 +41,7 @@ class Dashboard {
     ~Dashboard();
 
     std::string url() const { return http_->url(); }
-    // Runs the loop until stop() is called, its slots are over or it gives up; returns the last stretch's report.
+    // Runs the loop until stop() is called, its slots are over or it gives up; reports on all stretches.
     rt::LoopReport run();
     void stop();  // from any thread, not from a signal handler
     // When run() has returned: everything that was to be recorded was, and the plant's state was always finite.

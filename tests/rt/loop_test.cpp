@@ -333,6 +333,26 @@ TEST(Loop, StopEndsTheRunBeforeTheNextSlot) {
     EXPECT_EQ(loop.report().executed, 5);
 }
 
+TEST(Loop, ReportsOfStretchesAddUp) {
+    Script script;
+    script.step_time[3] = 5 * ms;
+    LoopSettings settings = ten_slots();
+    settings.slots = 6;
+    LoopReport sum = play(script, settings).report;
+    const std::int64_t began = sum.began, late = sum.late;
+    EXPECT_GT(late, 0);
+    settings.slots = 4;
+    const LoopReport second = play(script, settings).report;
+    sum.add(second);
+    EXPECT_EQ(sum.executed, 10);
+    EXPECT_EQ(sum.late, late + second.late);
+    EXPECT_EQ(sum.step.count(), 10);
+    EXPECT_EQ(sum.step.maximum(), 5 * ms);
+    EXPECT_EQ(sum.began, began);
+    EXPECT_EQ(sum.ended, second.ended);
+    EXPECT_EQ(sum.outcome, Outcome::completed);
+}
+
 TEST(Loop, FreePaceNeverSleeps) {
     Script script;
     LoopSettings settings = ten_slots();
