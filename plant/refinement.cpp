@@ -41,24 +41,48 @@ bool takes_forces_amiss(const Work& w, const double* late, double reach, const C
     return (reach * wrong > much && change() > much) || exceeds(w, wrong, force_tolerance);
 }
 
-// Friction that falls as the slip grows lets it grow by itself: what is amiss while it is small grows with it, however little
-// torque that is. A last stage that misses more than this share of such a fall does not follow it.
-constexpr double growth_tolerance = 0.01, growing = 1.2;
+// Friction that falls as the slip grows lets it grow by itself, as e^(λt): what is amiss while it is small grows with it,
+// however little torque that is. The stages follow λ times the length of the part up to this.
+constexpr double most_growth = 0.15, growing = 1.2;
 
-bool outgrows_stages(const Work& w) {
+// `answer(k)`: by how much a torque of 1 Nm, over the part, changes the slip of pair k.
+template <typename Answer>
+bool outgrows_stages(const Work& w, const Answer& answer) {
     const ModelData& m = w.model;
     if (!w.operators.table.fades && m.tabled_pairs.empty()) return false;
-    const double *const begin = w.scratch.begin().slip, *const late = w.scratch.late.slip,
-                        *const end = w.scratch.end().slip;
+    const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
     for (int k = 0; k < m.pairs; ++k) {
-        if (!slips(w.contact[k]) || !(std::fabs(end[k]) > growing * std::fabs(begin[k]))) continue;
+        const double from = std::fabs(begin.slip[k]), to = std::fabs(end.slip[k]);
+        if (!slips(w.contact[k]) || !(to > growing * from)) continue;
         const FrictionLaw& law = m.pair_laws[static_cast<std::size_t>(k)].friction;
-        const double before = sliding_factor(law, begin[k]), after = sliding_factor(law, end[k]);
-        if (before - after > rounding * before &&
-            std::fabs(after - sliding_factor(law, late[k])) > growth_tolerance * (before - after))
-            return true;
+        const double before = sliding_factor(law, from), fall = before - sliding_factor(law, to);
+        if (!(fall > rounding * before)) continue;
+        const double steepness = std::max(begin.load[k], end.load[k]) * fall / (to - from);
+        if (steepness * answer(k) > most_growth) return true;
     }
     return false;
+}
+
+// The last stage weighs a sixth of the part.
+double dense_answer(const Work& w, const Mode& mode, int k) {
+    const ModelData& m = w.model;
+    const int n = mode.order, seen = padded(m.seen), block = padded(n);
+    double change = 0;
+    for (int c = 0; c < n; ++c)
+        change += mode.view[panel_index(seen, n, k, c)] *
+                  w.scratch.used.from_late[panel_index(block, m.forces, c, k)];
+    return 6 * std::fabs(change);
+}
+
+double tree_answer(const TreeMode& t, double length, int k) {
+    const GroupPairs &slip = t.forces.slip, &share = t.forces.share;
+    double mobility = 0;
+    for (int i = 0; i < t.forces.count; ++i) {
+        if (t.forces.place[i] != k) continue;
+        mobility = slip.of_first[i] * share.of_first[i] * t.inverse_mass[share.first[i]] +
+                   slip.of_second[i] * share.of_second[i] * t.inverse_mass[share.second[i]];
+    }
+    return std::fabs(mobility) * length;
 }
 
 // Twists (the last coordinates, just before f) half way, exact and by the cubic through both ends: what lies between does
@@ -95,8 +119,7 @@ bool is_dense_coarse(Work& w, const Mode& mode) {
         }
         return moved;
     };
-    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || outgrows_stages(w) ||
-           hides_swing(w);
+    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || outgrows_stages(w, [&](int k) { return dense_answer(w, mode, k); }) || hides_swing(w);
 }
 
 // Along the tree shafts are not exact: the embedded method says how near they are. Where all stand still it says what rounding does.
@@ -128,7 +151,7 @@ bool is_tree_coarse(Work& w, const Mode& mode) {
         return m.kernel.loops.largest(of_mass, m.masses);
     };
     return swings_between(w, mode) || takes_forces_amiss(w, late, weight * t.liveliness, change) ||
-           outgrows_stages(w);
+           outgrows_stages(w, [&](int k) { return tree_answer(t, h, k); });
 }
 
 }  // namespace
