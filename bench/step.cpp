@@ -86,7 +86,7 @@ void worst_step(benchmark::State& bench, KernelKind kernel) {
     long misses = 0, events = 0;
     while (bench.KeepRunningBatch(steps * repeats)) {
         for (int repeat = 0; repeat < repeats; ++repeat) {
-            machine.state.restore(snapshot);
+            machine.state.restore(machine.model, snapshot);
             machine.operators.drop();
             machine.set("clutch.F2.pressure_command", 18e5);
             machine.step();  // the mode it starts in was built when the run began

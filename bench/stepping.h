@@ -91,7 +91,7 @@ void repeat(benchmark::State& bench, Machine& machine, int steps, Before&& befor
     long events = 0;
     double fastest = 1e300;
     while (bench.KeepRunningBatch(steps)) {  // the time reported is that of one step
-        machine.state.restore(snapshot);
+        machine.state.restore(machine.model, snapshot);
         const Stopwatch watch;
         for (int n = 0; n < steps; ++n) {
             before_step(n);
@@ -117,7 +117,7 @@ inline void repeat_event(benchmark::State& bench, Machine& machine) {
     }
     double fastest = 1e300, reading = 1e300;  // of which so much is reading the clock
     for (auto _ : bench) {
-        machine.state.restore(snapshot);
+        machine.state.restore(machine.model, snapshot);
         machine.step();
         const Stopwatch nothing;
         reading = std::min(reading, nothing.nanoseconds());

@@ -74,7 +74,9 @@ bool is_quiet(const Work& w, int pair) noexcept {
     double* const at = w.next + law.actuator;
     if (at[chamber_slot] != rest) return false;
     if (at[steady_slot] > law.delay_slots) return true;
-    if (!is_quiet(read_hydraulic(at), static_cast<std::size_t>(law.delay_slots), rest)) return false;
+    if (!is_quiet(*law.hydraulic, law.friction.return_pressure, read_hydraulic(at),
+                  static_cast<std::size_t>(law.delay_slots), rest))
+        return false;
     at[steady_slot] = law.delay_slots + 1;
     return true;
 }

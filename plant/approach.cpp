@@ -57,10 +57,10 @@ void look_ahead(Work& w, const Mode& mode, RootSearch& search, double close_enou
 }
 
 // Partial steps to where the device's margin vanishes: one as a rule, more where the interpolant errs (forces that
-// change much about that place, shafts that swing within the step). Returns the fraction reached; `end` is there.
-double approach_margin(Work& w, const Mode& mode, const Crossing& crossing, double done,
-                       double until) SHIFTRIG_REALTIME {
-    constexpr int most_steps = 4;
+// change much about that place, shafts that swing within the step). A step that may be divided had better be, then.
+Approached approach_margin(Work& w, const Mode& mode, const Crossing& crossing, double done,
+                           double until) SHIFTRIG_REALTIME {
+    const int most_steps = w.model.maximum_parts > 1 ? 4 : 16;
     const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
     RootSearch search{done, until, left(w.scratch.begin()), left(w.scratch.end()),
                       done + crossing.theta * (until - done)};
@@ -75,7 +75,8 @@ double approach_margin(Work& w, const Mode& mode, const Crossing& crossing, doub
         const double reached = search.place;
         integrate(w, mode, reached);
         const double rest = left(w.scratch.end());
-        if (std::fabs(rest) <= close_enough || steps == most_steps) return reached;
+        const bool found = std::fabs(rest) <= close_enough;
+        if (found || steps == most_steps) return {reached, found};
         search.tell(rest, beyond);
     }
 }
@@ -83,7 +84,7 @@ double approach_margin(Work& w, const Mode& mode, const Crossing& crossing, doub
 // The same for a flank, whose new state only holds behind the crossing: as near behind it as rounding lets nobody mind. A
 // damped flank begins with a jump of its torque, and contacts follow one another by hundreds: an instant that is late by
 // δ costs 2ζωδ of the speed of each. Newton's method, kept in the bracket, aims at the middle of what is near enough.
-double approach_flank(Work& w, const Mode& mode, const Crossing& crossing, double done,
+Approached approach_flank(Work& w, const Mode& mode, const Crossing& crossing, double done,
                       double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 12;
     const Sample& begin = w.scratch.begin();
@@ -99,14 +100,14 @@ double approach_flank(Work& w, const Mode& mode, const Crossing& crossing, doubl
     for (int steps = 1; steps < most_steps; ++steps) {
         integrate(w, mode, reached);
         const double rest = left(end);
-        if (rest <= 0 && rest >= -close_enough) return reached;
+        if (rest <= 0 && rest >= -close_enough) return {reached};
         (rest > 0 ? low : high) = reached;
         sample_rate(w, mode, end);
         const double newton = reached - (rest + 0.5 * close_enough) / (margin_rate(w, flank, end) * w.h);
         reached = newton > low && newton < high ? newton : 0.5 * (low + high);
     }
     integrate(w, mode, high);
-    return high;
+    return {high};
 }
 
 }  // namespace
@@ -120,8 +121,8 @@ bool changes_at_once(const Work& w, const Crossing& crossing, double length) SHI
            flank_margin(w, backlash_of(w, crossing.device), w.scratch.begin()) <= 0;
 }
 
-double approach(Work& w, const Mode& mode, const Crossing& crossing, double done,
-                double until) SHIFTRIG_REALTIME {
+Approached approach(Work& w, const Mode& mode, const Crossing& crossing, double done,
+                    double until) SHIFTRIG_REALTIME {
     return crossing.change == Change::flank ? approach_flank(w, mode, crossing, done, until)
                                             : approach_margin(w, mode, crossing, done, until);
 }

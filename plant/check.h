@@ -26,6 +26,10 @@ class Check {
     void share(const char* field, double value) const {
         rule(field, value, value > 0 && value <= 1, "in (0, 1]");
     }
+    void within(const char* field, double value, double least, double most) const {
+        rule(field, value, value >= least && value <= most,
+             ("within " + number(least) + " and " + number(most)).c_str());
+    }
     void any(const char* field, double value) const { rule(field, value, true, "finite"); }
     // Two points at least, the first column strictly rising.
     void rising(const char* field, const std::vector<std::pair<double, double>>& table) const;

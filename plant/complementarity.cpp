@@ -60,7 +60,7 @@ bool solve_complementarity(double* tableau, int* basis, int size) SHIFTRIG_REALT
             const double* const line = tableau + r * columns;
             const double rate = line[entering];
             if (rate <= nothing) continue;
-            const double* const best = tableau + row * columns;
+            const double* const best = row < 0 ? line : tableau + row * columns;
             const bool sooner = row < 0 || leaves_before(line, rate, best, best[entering], size);
             const bool ends = basis[r] == artificial && row >= 0 &&
                               line[last] / rate <= best[last] / best[entering] + nothing;

@@ -27,8 +27,6 @@
 
 namespace shiftrig::plant {
 
-enum class Motion { rotating, translating };
-
 struct Mass {
     std::string name;
     double inertia = 0;  // [kg m²], or [kg] where translating

@@ -134,10 +134,7 @@ void latch_inputs(Work& w, const Inputs& inputs) SHIFTRIG_REALTIME {
     known.inputs_known = true;
     known.carried = false;
     for (std::size_t i = 0; i < m.inputs.size(); ++i) {
-        const Signal& signal = m.inputs[i];
-        const double value = inputs.value[i];
-        w.operators.input[i] =
-            value != value ? signal.initial : std::clamp(value, signal.minimum, signal.maximum);
+        w.operators.input[i] = m.inputs[i].limited(inputs.value[i]);
     }
     for (std::size_t t = 0; t < m.tyres.size(); ++t) {
         const TyreLaw& law = m.tyres[t];

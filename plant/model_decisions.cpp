@@ -25,7 +25,9 @@ double mobility_between(const ModelData& m, const std::array<Link, 2>& links) {
 
 // As many parts of a step as `reach` time constants or radians of turn ask for.
 void divide_step(ModelData& m, double reach, int most) {
-    while (m.maximum_parts > 1 && m.maximum_parts < reach && m.maximum_parts < most) m.maximum_parts *= 2;
+    if (m.maximum_parts == 1) return;
+    while (m.maximum_parts < reach && m.maximum_parts < most)
+        m.maximum_parts = std::min(2 * m.maximum_parts, most);
 }
 
 }  // namespace

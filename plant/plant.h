@@ -166,8 +166,11 @@ class State {
     std::span<const double> speeds() const noexcept;  // ω of each mass, description order [rad/s] or [m/s]
     std::span<const double> twists() const noexcept;  // of each shaft [rad]
     std::span<const std::byte> bytes() const noexcept;
-    // False (and unchanged) if the size is not the model's.
-    bool restore(std::span<const std::byte> bytes) noexcept;
+    // Is the block one of this model's? Its size, masses, twists and step are, and there are such contact states, places in
+    // delay lines and modes of engines.
+    bool is_of(const Model& model) const noexcept;
+    // False (and unchanged) if bytes() of a state of this model are something else.
+    bool restore(const Model& model, std::span<const std::byte> bytes);
 
     std::vector<double> block;  // layout in plant/state_layout.h
 };
@@ -212,6 +215,7 @@ struct Start {
     std::vector<std::string> locked;
     std::vector<std::pair<std::string, double>> speeds;
 };
+// Throws ModelError where a name is none of the model's, or speeds contradict each other.
 void start(const Model& model, State& state, const Start& start, const Inputs& inputs);
 
 // Time 0 is now: steps, ways, heat and the energy account count from here on, the motion is as it was.

@@ -42,23 +42,28 @@ bool takes_forces_amiss(const Work& w, const double* late, double reach, const C
 }
 
 // Friction that falls as the slip grows lets it grow by itself, as e^(λt): what is amiss while it is small grows with it,
-// however little torque that is. The stages follow λ times the length of the part up to this.
-constexpr double most_growth = 0.15, growing = 1.2;
+// however little torque that is. The stages follow λ times the length of the part up to this. Friction that falls as the slip
+// shrinks holds it up as a damper would, and is taken explicitly.
+constexpr double most_growth = 0.15, most_damping = 1, growing = 1.2;
 
 // `answer(k)`: by how much a torque of 1 Nm, over the part, changes the slip of pair k.
 template <typename Answer>
-bool outgrows_stages(const Work& w, const Answer& answer) {
+bool friction_outruns_stages(const Work& w, const Answer& answer) {
     const ModelData& m = w.model;
     if (!w.operators.table.fades && m.tabled_pairs.empty()) return false;
     const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
     for (int k = 0; k < m.pairs; ++k) {
-        const double from = std::fabs(begin.slip[k]), to = std::fabs(end.slip[k]);
-        if (!slips(w.contact[k]) || !(to > growing * from)) continue;
+        if (!slips(w.contact[k])) continue;
+        // One that passes through no slip is past all that there is.
+        const double from = std::fabs(begin.slip[k]), to = std::fmax(0, slip_sign(w.contact[k]) * end.slip[k]);
+        const bool grows = to > growing * from, shrinks = from > growing * to;
         const FrictionLaw& law = m.pair_laws[static_cast<std::size_t>(k)].friction;
+        const bool fades = law.factor_over_slip == nullptr && law.rise >= 0;
+        if (!grows && (!shrinks || fades)) continue;
         const double before = sliding_factor(law, from), fall = before - sliding_factor(law, to);
         if (!(fall > rounding * before)) continue;
-        const double steepness = std::max(begin.load[k], end.load[k]) * fall / (to - from);
-        if (steepness * answer(k) > most_growth) return true;
+        const double steepness = std::max(begin.load[k], end.load[k]) * fall / std::fabs(to - from);
+        if (steepness * answer(k) > (grows ? most_growth : most_damping)) return true;
     }
     return false;
 }
@@ -119,7 +124,7 @@ bool is_dense_coarse(Work& w, const Mode& mode) {
         }
         return moved;
     };
-    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || outgrows_stages(w, [&](int k) { return dense_answer(w, mode, k); }) || hides_swing(w);
+    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || friction_outruns_stages(w, [&](int k) { return dense_answer(w, mode, k); }) || hides_swing(w);
 }
 
 // Along the tree shafts are not exact: the embedded method says how near they are. Where all stand still it says what rounding does.
@@ -151,7 +156,7 @@ bool is_tree_coarse(Work& w, const Mode& mode) {
         return m.kernel.loops.largest(of_mass, m.masses);
     };
     return swings_between(w, mode) || takes_forces_amiss(w, late, weight * t.liveliness, change) ||
-           outgrows_stages(w, [&](int k) { return tree_answer(t, h, k); });
+           friction_outruns_stages(w, [&](int k) { return tree_answer(t, h, k); });
 }
 
 }  // namespace

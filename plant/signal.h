@@ -41,6 +41,11 @@ struct Signal {
     double minimum = -1e300;  // inputs outside [minimum, maximum] are limited by the assembly, and counted
     double maximum = 1e300;
     std::string description;  // one line for help texts and schemas
+
+    // An input as it acts: within its range, not-a-number taken as the initial value.
+    double limited(double value) const noexcept {
+        return value != value ? initial : value < minimum ? minimum : value > maximum ? maximum : value;
+    }
 };
 
 }  // namespace shiftrig::plant

@@ -65,7 +65,10 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
     const Structure& s = m.structure;
     const double* speeds = block + m.layout.speeds;
     auto* contact = reinterpret_cast<unsigned char*>(block + m.layout.contact);
-    const auto input = [&](int index) { return index < 0 ? 0. : inputs[static_cast<std::size_t>(index)]; };
+    const auto input = [&](int index) {
+        const auto i = static_cast<std::size_t>(index);
+        return index < 0 ? 0. : m.inputs[i].limited(inputs[i]);
+    };
     for (int k = 0; k < m.pairs; ++k) {
         const auto i = static_cast<std::size_t>(k);
         const detail::PairLaw& law = m.pair_laws[i];
@@ -82,7 +85,8 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
                     command = interpolate(law.hydraulic->solenoid->pressure_over_current, command);
                 }
                 HydraulicState state =
-                    hydraulic_rest(*law.hydraulic, law.friction.return_pressure, command,
+                    hydraulic_rest(*law.hydraulic, law.friction.return_pressure,
+                                   limited_command(*law.hydraulic, command),
                                    std::span<double>(block + law.actuator + detail::hydraulic_slots,
                                                      static_cast<std::size_t>(law.delay_slots)));
                 state.play = play;
@@ -136,7 +140,7 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
     for (std::size_t i = 0; i < m.sensors.size(); ++i) {
         const SpeedSensor& sensor = m.description.sensors[i];
         const double speed = speeds[m.sensors[i].mass];
-        sensor_slots.since_edge[i] = SensorState{}.since_edge;
+        sensor_slots.since_edge[i] = speed == 0 ? SensorState{}.since_edge : 0;  // a tooth is there just now
         sensor_slots.reading[i] = sensor_slots.output[i] =
             sensor.ideal || sensor.directional ? speed : std::fabs(speed);
     }
@@ -191,9 +195,38 @@ std::span<const std::byte> State::bytes() const noexcept {
     return std::as_bytes(std::span<const double>(block));
 }
 
-bool State::restore(std::span<const std::byte> bytes) noexcept {
+bool State::is_of(const Model& model) const noexcept {
+    const ModelData& m = model.data();
+    const double* const at = block.data();
+    if (static_cast<int>(block.size()) != m.layout.size || detail::read_integer(at) < 0 ||
+        detail::read_integer(at + 1) != m.masses || detail::read_integer(at + 2) != m.twists ||
+        at[3] != m.options.step_size)
+        return false;
+    const auto* const contact = reinterpret_cast<const unsigned char*>(at + m.layout.contact);
+    for (int k = 0; k < m.contact_bytes; ++k) {
+        const int most = k < m.pairs         ? detail::free_running
+                         : k < m.first_flank ? detail::moves | detail::moves_backward | detail::driven
+                                             : detail::flank_backward;
+        if (contact[k] > most) return false;
+    }
+    for (const int k : m.hydraulic_pairs) {
+        const detail::PairLaw& law = m.pair_laws[static_cast<std::size_t>(k)];
+        const double head = at[law.actuator + detail::head_slot];
+        if (!(head >= 0 && head < law.delay_slots)) return false;
+    }
+    for (std::size_t e = 0; e < m.engines.size(); ++e) {
+        const double mode = at[m.layout.engines + 3 * static_cast<int>(e)];
+        if (!(mode >= 0 && mode <= static_cast<int>(EngineMode::cranking))) return false;
+    }
+    return true;
+}
+
+bool State::restore(const Model& model, std::span<const std::byte> bytes) {
     if (bytes.size() != block.size() * sizeof(double)) return false;
-    std::memcpy(block.data(), bytes.data(), bytes.size());
+    State restored(*this);
+    std::memcpy(restored.block.data(), bytes.data(), bytes.size());
+    if (!restored.is_of(model)) return false;
+    block.swap(restored.block);
     return true;
 }
 

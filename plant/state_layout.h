@@ -56,7 +56,7 @@ SensorSlotsOf<Number> sensor_slots(const StateLayout& layout, std::size_t sensor
 }
 
 // A hydraulic actuator: its state, then the delay line.
-constexpr int hydraulic_slots = 8, chamber_slot = 6, steady_slot = 7;
+constexpr int hydraulic_slots = 8, head_slot = 1, chamber_slot = 6, steady_slot = 7;
 inline HydraulicState read_hydraulic(const double* at) noexcept {
     return {at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7]};
 }

@@ -111,7 +111,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         if (inside && changes_at_once(w, first, until - done)) {
             reached = done;
         } else if (inside && first.theta < 1 - instant) {
-            reached = approach(w, *mode, first, done, until);
+            Approached place = approach(w, *mode, first, done, until);
             // An estimate that came too late passed over another change, which goes first; of flanks also what approach()
             // goes beyond the crossing, since the power of a mesh often turns in the instant that lets one go.
             for (int passed = 0; passed < 2; ++passed) {
@@ -120,8 +120,14 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
                     earlier = first_flank(w, s.begin(), s.end());
                 if (earlier.device < 0 || earlier.device == first.device) break;
                 first = earlier;
-                reached = approach(w, *mode, first, done, reached);
+                place = approach(w, *mode, first, done, place.fraction);
             }
+            // Where the instant is not found, or forces change too much on the way there, a shorter part knows better.
+            if (divides && length >= halvable && (!place.found || is_coarse(w, *mode))) {
+                length *= 0.5;
+                continue;
+            }
+            reached = place.fraction;
         }
 
         // Energy ledger of the accepted part.

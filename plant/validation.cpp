@@ -1,5 +1,6 @@
 #include "plant/validation.h"
 
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
@@ -35,12 +36,13 @@ class Joints {
             throw ModelError(end.kind, end.device, end.field, rule);
         }
     }
-    void translating(std::string_view kind, const std::string& device, const char* field,
-                     const std::string& mass) const {
-        if (motion_.at(mass) != Motion::translating) {
-            throw ModelError(std::string(kind), device, field,
-                             "= \"" + mass + "\"; must be a translating mass");
-        }
+    Motion motion(const std::string& mass) const { return motion_.at(mass); }
+    void moves(std::string_view kind, const std::string& device, const char* field, const std::string& mass,
+               Motion motion, const char* why = "") const {
+        if (motion_.at(mass) == motion) return;
+        throw ModelError(std::string(kind), device, field,
+                         "= \"" + mass + "\"; must be a " +
+                             (motion == Motion::rotating ? "rotating" : "translating") + " mass" + why);
     }
 
   private:
@@ -104,16 +106,33 @@ void validate(const Description& d) {
     joints.check();
 
     for_each_connector(d, [&](const auto& device) {
-        for (const End& end : ends(device)) {
-            if (end.translating && !end.mass.empty())
-                joints.translating(kind(device), device.name, end.field, end.mass);
+        const auto links = ends(device);
+        for (const End& end : links) {
+            if (end.mass.empty() || end.motion == EndMotion::any) continue;
+            const bool alike = end.motion == EndMotion::alike;
+            const Motion motion = alike                                  ? joints.motion(links[0].mass)
+                                  : end.motion == EndMotion::translating ? Motion::translating
+                                                                         : Motion::rotating;
+            joints.moves(kind(device), device.name, end.field, end.mass, motion,
+                         alike ? ", as the other end is" : "");
         }
     });
+    for (const SpeedSensor& sensor : d.sensors) {
+        if (!sensor.ideal)
+            joints.moves("sensor", sensor.name, "mass", sensor.mass, Motion::rotating, " to have teeth");
+    }
     const auto between_one_and = [&](int most, const char* field, int value) {
         if (value < 1 || value > most)
             throw ModelError("model", d.name, field,
                              "= " + std::to_string(value) + "; must be within 1 and " + std::to_string(most));
     };
+    constexpr double most_combinations = 1000;
+    double combinations = 1;
+    for (const Gear& gear : d.gears) combinations *= std::fmax(1, static_cast<double>(gear.options.size()));
+    if (combinations > most_combinations)
+        throw ModelError("model", d.name, "gears",
+                         "have " + number(combinations) + " combinations of options; must be " +
+                             number(most_combinations) + " at most");
     std::set<std::string> selectors;
     for (const GearPath& path : d.gear_paths) selectors.insert(path.closed.begin(), path.closed.end());
     if (selectors.size() > Description::most_selectors)

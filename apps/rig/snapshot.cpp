@@ -105,6 +105,7 @@ Setup setup_of(const io::Manifest& snapshot) {
 
 void resume(Rig& rig, const io::Manifest& snapshot) {
     io::Archive::restore(snapshot.assembly, rig);
+    if (!rig.state().is_of(rig.model())) throw io::RecordingError("its state is not one of its own model's");
 }
 
 analysis::Run history_of(const io::Manifest& snapshot) {

@@ -57,7 +57,7 @@ class Replayer {
           inputs_(model),
           outputs_(model),
           scratch_(model) {
-        if (!state_.restore(manifest.initial_state))
+        if (!state_.restore(model, manifest.initial_state))
             throw RecordingError("starts from a state of " + std::to_string(manifest.initial_state.size()) +
                                  " bytes that does not fit the model's " +
                                  std::to_string(model.state_size()) + ": the machine has another structure");
@@ -78,7 +78,7 @@ class Replayer {
         // As much as a tick of the recording keeps.
         events_.resize(std::min(events_.size(), static_cast<std::size_t>(plant::Outputs::event_capacity)));
     }
-    bool restore(const std::vector<std::byte>& state) { return state_.restore(state); }
+    bool restore(const std::vector<std::byte>& state) { return state_.restore(model_, state); }
 
     bool has_output(std::size_t recorded) const { return output_index_[recorded] >= 0; }
     double output(std::size_t recorded) const {

@@ -71,7 +71,7 @@ inline const char* kind(const Backlash&) {
     return "backlash";
 }
 inline std::array<End, 2> ends(const Backlash& c) {
-    return {End{"a", c.a}, End{"b", c.b}};
+    return {End{"a", c.a}, End{.field = "b", .mass = c.b, .motion = EndMotion::alike}};
 }
 void check_parameters(const Check& check, const Backlash& device);
 void assemble(Assembly& assembly, const Backlash& device);

@@ -70,9 +70,9 @@ void check_parameters(const Check& check, const Clutch& c) {
         check.positive("mu_sliding", wet.mu_sliding);
         check.any("mu_rise", wet.mu_rise);
         if (!(wet.mu_sliding + wet.mu_rise > 0)) check.fail("mu_rise", "makes the sliding friction negative");
-        if (!(wet.mu_static >= wet.mu_sliding)) {
-            check.fail("mu_static", "= " + number(wet.mu_static) + "; must be >= mu_sliding");
-        }
+        if (const double at_rest = wet.mu_sliding + std::fmax(0, wet.mu_rise); !(wet.mu_static >= at_rest))
+            check.fail("mu_static", "= " + number(wet.mu_static) + "; must be >= " + number(at_rest) +
+                                        ", what slides at rest (mu_sliding + mu_rise)");
         check.any("mu_static", wet.mu_static);
         check.positive("mu_speed", wet.mu_speed);
         if (c.drag) check.positive("clearance", wet.clearance);
@@ -102,18 +102,23 @@ void check_parameters(const Check& check, const Clutch& c) {
         if (wet && has_piston(*h) && !(h->preload_pressure <= wet->return_pressure))
             check.fail("preload_pressure",
                        "= " + number(h->preload_pressure) + "; must be <= return_pressure");
+        if (wet && !(h->maximum_pressure > wet->return_pressure))
+            check.fail("maximum_pressure",
+                       "= " + number(h->maximum_pressure) + "; must be > return_pressure, which it works against");
         if (h->solenoid) {
             check.rising("solenoid", h->solenoid->pressure_over_current);
             check.not_negative("hysteresis", h->solenoid->hysteresis);
         }
-        check.any("initial", h->initial);
+        check.within("initial", h->initial, 0, h->maximum_pressure);
     } else if (const auto* direct = std::get_if<ActuationDirect>(&c.actuation)) {
         check.waveform("profile", direct->profile);
         check.not_negative("initial", direct->initial);
     } else if (const auto* release = std::get_if<ActuationRelease>(&c.actuation)) {
         check.not_negative("lag", release->lag);
+        check.within("initial", release->initial, 0, 1);
     } else if (const auto* apply = std::get_if<ActuationApply>(&c.actuation)) {
         check.not_negative("lag", apply->lag);
+        check.within("initial", apply->initial, 0, 1);
     }
     if (c.heat) {
         check.positive("surface_capacity", c.heat->surface_capacity);

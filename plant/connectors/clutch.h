@@ -123,8 +123,12 @@ inline const char* kind(const Clutch& c) {
     return c.b.empty() ? "brake" : "clutch";
 }
 inline std::array<End, 2> ends(const Clutch& c) {
-    return {End{"a", c.a},
-            End{.field = "b", .mass = c.b, .may_be_housing = true, .translating = c.radius > 0}};
+    const bool on_road = c.radius > 0;
+    return {End{.field = "a", .mass = c.a, .motion = on_road ? EndMotion::rotating : EndMotion::any},
+            End{.field = "b",
+                .mass = c.b,
+                .may_be_housing = true,
+                .motion = on_road ? EndMotion::translating : EndMotion::alike}};
 }
 inline bool may_be_closed(const Clutch&) {
     return true;

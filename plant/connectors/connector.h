@@ -22,13 +22,23 @@ class ModelBuilder;  // model_builder.h
 struct Shown;        // shown.h
 }  // namespace detail
 
+enum class Motion { rotating, translating };
+
+// How the mass at a link has to move.
+enum class EndMotion {
+    any,
+    rotating,     // an inertia
+    translating,  // a body
+    alike,        // as the one at the first link does: nothing converts between them
+};
+
 // One link of a connector: the member of its struct that names the mass.
 struct End {
     const char* field;
     const std::string& mass;
     bool may_be_housing = false;  // where it is empty
     const char* role = "";        // in a drawing, where the ends are not alike
-    bool translating = false;     // the mass has to be a body, not an inertia
+    EndMotion motion = EndMotion::any;
 };
 
 // ---- what each kind has to answer

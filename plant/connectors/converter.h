@@ -22,7 +22,8 @@ inline const char* kind(const TorqueConverter&) {
     return "converter";
 }
 inline std::array<End, 2> ends(const TorqueConverter& c) {
-    return {End{"pump", c.pump, false, "pump"}, End{"turbine", c.turbine, false, "turbine"}};
+    return {End{"pump", c.pump, false, "pump", EndMotion::rotating},
+            End{"turbine", c.turbine, false, "turbine", EndMotion::rotating}};
 }
 void check_parameters(const Check& check, const TorqueConverter& device);
 void add_law(detail::ModelBuilder& builder, const TorqueConverter& device);

@@ -20,7 +20,8 @@ inline const char* kind(const Damper&) {
     return "damper";
 }
 inline std::array<End, 2> ends(const Damper& c) {
-    return {End{"a", c.a}, End{"b", c.b, true}};
+    return {End{"a", c.a},
+            End{.field = "b", .mass = c.b, .may_be_housing = true, .motion = EndMotion::alike}};
 }
 void check_parameters(const Check& check, const Damper& device);
 void assemble(Assembly& assembly, const Damper& device);

@@ -24,16 +24,20 @@ void check_parameters(const Check& check, const Engine& e) {
     }
     check.not_negative("fade_to", e.fade_to);
     check.not_negative("fade_from", e.fade_from);
+    if (e.fade_from > 0 && !(e.fade_to < e.fade_from))
+        check.fail("fade_to", "= " + number(e.fade_to) + "; must be < fade_from");
+    for (const auto& point : e.full_load) {
+        if (point.second < 0) check.fail("full_load", "= " + number(point.second) + "; must be >= 0");
+    }
     check.not_negative("stall_speed", e.stall_speed);
     if (e.cylinders < 1) check.fail("cylinders", "= " + std::to_string(e.cylinders) + "; must be >= 1");
 }
 
 void assemble(Assembly& assembly, const Engine& e) {
-    if (e.stall_speed <= 0 || e.friction_constant <= 0) return;
-    assembly.structure.pairs.push_back({e.name + ".friction",
-                                        PairKind::engine_friction,
-                                        {assembly.link(e.mass, 1), Link{}},
-                                        e.friction_constant});
+    const double friction = engine_friction(e, e.stall_speed);  // the most of a stalled one
+    if (e.stall_speed <= 0 || friction <= 0) return;
+    assembly.structure.pairs.push_back(
+        {e.name + ".friction", PairKind::engine_friction, {assembly.link(e.mass, 1), Link{}}, friction});
 }
 
 void add_pair_law(detail::ModelBuilder& builder, const Engine& e) {

@@ -31,7 +31,7 @@ inline const char* kind(const Engine&) {
     return "engine";
 }
 inline std::array<End, 1> ends(const Engine& c) {
-    return {End{.field = "mass", .mass = c.mass}};
+    return {End{.field = "mass", .mass = c.mass, .motion = EndMotion::rotating}};
 }
 void check_parameters(const Check& check, const Engine& device);
 void assemble(Assembly& assembly, const Engine& device);

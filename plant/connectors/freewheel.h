@@ -64,7 +64,8 @@ inline const char* kind(const Freewheel&) {
     return "freewheel";
 }
 inline std::array<End, 2> ends(const Freewheel& c) {
-    return {End{"a", c.a}, End{"b", c.b, true}};
+    return {End{"a", c.a},
+            End{.field = "b", .mass = c.b, .may_be_housing = true, .motion = EndMotion::alike}};
 }
 inline bool may_be_closed(const Freewheel&) {
     return true;

@@ -23,8 +23,8 @@ inline const char* kind(const Planetary&) {
     return "planetary row";
 }
 inline std::array<End, 3> ends(const Planetary& p) {
-    return {End{"sun", p.sun, false, "sun"}, End{"ring", p.ring, false, "ring"},
-            End{"carrier", p.carrier, false, "carrier"}};
+    return {End{"sun", p.sun, false, "sun"}, End{"ring", p.ring, false, "ring", EndMotion::alike},
+            End{"carrier", p.carrier, false, "carrier", EndMotion::alike}};
 }
 void check_parameters(const Check& check, const Planetary& device);
 void assemble(Assembly& assembly, const Planetary& device);

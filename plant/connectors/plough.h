@@ -24,7 +24,7 @@ inline const char* kind(const Plough&) {
     return "plough";
 }
 inline std::array<End, 1> ends(const Plough& c) {
-    return {End{.field = "body", .mass = c.body, .translating = true}};
+    return {End{.field = "body", .mass = c.body, .motion = EndMotion::translating}};
 }
 void check_parameters(const Check& check, const Plough& device);
 void assemble(Assembly& assembly, const Plough& device);

@@ -22,7 +22,7 @@ inline const char* kind(const Road&) {
     return "road";
 }
 inline std::array<End, 1> ends(const Road& c) {
-    return {End{.field = "body", .mass = c.body, .translating = true}};
+    return {End{.field = "body", .mass = c.body, .motion = EndMotion::translating}};
 }
 void check_parameters(const Check& check, const Road& device);
 void add_law(detail::ModelBuilder& builder, const Road& device);

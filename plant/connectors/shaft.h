@@ -23,7 +23,7 @@ inline const char* kind(const Shaft&) {
     return "shaft";
 }
 inline std::array<End, 2> ends(const Shaft& c) {
-    return {End{"a", c.a}, End{"b", c.b}};
+    return {End{"a", c.a}, End{.field = "b", .mass = c.b, .motion = EndMotion::alike}};
 }
 void check_parameters(const Check& check, const Shaft& device);
 void assemble(Assembly& assembly, const Shaft& device);

@@ -33,7 +33,8 @@ inline const char* kind(const BrixiusTyre&) {
     return "tyre";
 }
 inline std::array<End, 2> ends(const BrixiusTyre& t) {
-    return {End{"wheel", t.wheel}, End{.field = "body", .mass = t.body, .translating = true}};
+    return {End{.field = "wheel", .mass = t.wheel, .motion = EndMotion::rotating},
+            End{.field = "body", .mass = t.body, .motion = EndMotion::translating}};
 }
 void check_parameters(const Check& check, const BrixiusTyre& device);
 void assemble(Assembly& assembly, const BrixiusTyre& device);

@@ -19,7 +19,7 @@
 // cut), along the governor's own line. Below stall_speed the engine has stalled: its torque is 0 and its
 // friction becomes a friction device on the crankshaft (capacity T_friction), so that it resists either
 // way and holds at rest. A start event cranks it with half of the torque at fade_from [estimate] up to
-// fade_from, or for at most 3 s.
+// fade_from (and stall_speed), or for at most 3 s.
 // Source: usual mean-value model; parameters of the reference tractor in docs/mechanics.md.
 // Does not model: cylinder-by-cylinder torque, smoke limit beyond φ, engine brake, temperature.
 #pragma once
@@ -116,7 +116,7 @@ inline EngineDrive engine_drive(const Engine& p, const EngineSetting& set, const
     drive.torque = set.actuator_rate > 0 ? state.torque : demand;
     drive.rate.torque = (demand - state.torque) * set.actuator_rate;
     if (set.turbo_rate > 0) {
-        const double load = full > 0 && state.torque > 0 ? std::min(state.torque / full, 1.) : 0;
+        const double load = full > 0 && drive.torque > 0 ? std::min(drive.torque / full, 1.) : 0;
         drive.rate.boost = (load - state.boost) * set.turbo_rate;
     }
     return drive;
@@ -138,7 +138,7 @@ inline EngineMode next_engine_mode(const Engine& p, EngineMode mode, double spee
             return start_edge ? EngineMode::cranking : EngineMode::stalled;
         case EngineMode::cranking:
             crank_time += h;
-            if (speed >= p.fade_from) return EngineMode::running;
+            if (speed >= p.fade_from && speed >= p.stall_speed) return EngineMode::running;
             return crank_time < longest_cranking ? EngineMode::cranking : EngineMode::stalled;
     }
     return mode;

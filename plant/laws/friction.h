@@ -89,7 +89,9 @@ inline double load_from_engagement(const FrictionLaw& law, double engagement) no
 
 // Friction factor of the sliding pair at this slip; times load = sliding capacity.
 inline double sliding_factor(const FrictionLaw& law, double slip) noexcept {
-    if (law.factor_over_slip != nullptr) return extrapolate(*law.factor_over_slip, std::fabs(slip));
+    // Beyond its last point a table goes on as it came, but friction never drives.
+    if (law.factor_over_slip != nullptr)
+        return std::fmax(0, extrapolate(*law.factor_over_slip, std::fabs(slip)));
     if (law.rise == 0) return law.base;
     return law.base + law.rise * exp(-std::fabs(slip) * law.inverse_speed);
 }

@@ -260,9 +260,11 @@ inline double limited_command(const ActuationHydraulic& p, double command) noexc
 // Nothing will change in a step with the limited command `target`: the delay line holds nothing else, and valve and piston
 // have arrived. Advancing the state would leave all but `head` as it is. Once found, `steady` says so, one more than the
 // slots: it is then enough that the command is still where the chamber is.
-inline bool is_quiet(const HydraulicState& state, std::size_t slots, double target) noexcept {
+inline bool is_quiet(const ActuationHydraulic& p, double return_pressure, const HydraulicState& state,
+                     std::size_t slots, double target) noexcept {
     return state.chamber == target && state.slewed == target && state.valve == target &&
-           state.valve_rate == 0 && state.steady >= static_cast<double>(slots);
+           state.valve_rate == 0 && state.steady >= static_cast<double>(slots) &&
+           (!has_piston(p) || state.piston == balanced_stroke(p, return_pressure, target));
 }
 
 // One step with the pressure command `command` held over it. `valve_held`: the valve sticks and keeps its

@@ -12,6 +12,7 @@
 // Does not model: tooth pitch errors, the pick-up's amplitude, timer resolution.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -22,7 +23,7 @@ namespace shiftrig::plant {
 
 struct SensorState {
     double position = 0;      // of the wheel [teeth], 0 … teeth
-    double since_edge = 1e9;  // time since the last tooth seen [s]
+    double since_edge = 1e9;  // time since the last tooth seen; at first, of one that stands [s]
     double reading = 0;       // speed by the period [rad/s], signed only where directional
     double output = 0;        // after faults [rad/s]
 };
@@ -86,11 +87,15 @@ inline void advance_pickup(const SpeedSensor& p, SensorState& state, double begi
     if (missing_teeth <= 0) {
         seen = count;
     } else {
-        for (std::int64_t i = 0; i < count && i < 1000; ++i) {
+        // Whole turns show all teeth but those; the edges of the last one are looked at one by one.
+        const std::int64_t turns = count / p.teeth;
+        const std::int64_t there = std::max(0, p.teeth - missing_teeth);
+        seen = turns * there;
+        for (std::int64_t i = std::max<std::int64_t>(0, count - p.teeth); there > 0 && i < count; ++i) {
             const std::int64_t edge = forward ? first + i : first - i;
             const std::int64_t tooth = ((edge % p.teeth) + p.teeth) % p.teeth;
             if (tooth < missing_teeth) continue;
-            ++seen;
+            if (i >= turns * p.teeth) ++seen;
             last_seen = edge;
         }
     }

@@ -7,6 +7,7 @@
 #include <new>
 
 #include "io/model_file.h"
+#include "plant/model_data.h"
 #include "rig.h"
 
 namespace {
@@ -96,7 +97,7 @@ TEST(Roles, ASnapshotContinuesBitForBitInAnotherMachine) {
     Drive first;
     for (int n = 0; n < 480; ++n) first.step();
     Drive second;
-    ASSERT_TRUE(second.rig.state.restore(first.rig.state.bytes()));
+    ASSERT_TRUE(second.rig.state.restore(second.rig.model, first.rig.state.bytes()));
     second.rig.inputs = first.rig.inputs;
     for (int n = 480; n < drive_steps; ++n) {
         first.step();
@@ -105,10 +106,26 @@ TEST(Roles, ASnapshotContinuesBitForBitInAnotherMachine) {
     }
 }
 
-TEST(Roles, ASnapshotOfAnotherSizeIsRefused) {
+TEST(Roles, ASnapshotOfAnotherMachineIsRefused) {
     Drive drive;
-    const std::vector<std::byte> wrong(drive.rig.state.bytes().size() - 8);
-    EXPECT_FALSE(drive.rig.state.restore(wrong));
+    State& state = drive.rig.state;
+    const Model& model = drive.rig.model;
+    EXPECT_TRUE(state.is_of(model));
+    const std::vector<std::byte> wrong(state.bytes().size() - 8);
+    EXPECT_FALSE(state.restore(model, wrong));
+
+    const std::vector<double> good = state.block;
+    const auto& at = model.data().layout;
+    const auto refuses = [&](int slot, double value) {
+        std::vector<double> forged = good;
+        forged[static_cast<std::size_t>(slot)] = value;
+        return !state.restore(model, std::as_bytes(std::span<const double>(forged))) && state.block == good;
+    };
+    EXPECT_TRUE(refuses(1, 1e300));  // masses
+    EXPECT_TRUE(refuses(3, 5e-4));   // step size
+    EXPECT_TRUE(refuses(at.contact, 1e300));
+    EXPECT_TRUE(refuses(at.engines, 7));
+    EXPECT_FALSE(refuses(at.speeds, 100));
 }
 
 TEST(Roles, SteppingAllocatesNothing) {
