@@ -74,11 +74,13 @@ std::string explain(const Model& model, const Event& event) {
             return line + format("locks: slip %.3g, ", event.slip) + torque + amount(event, event.torque) +
                    " of " + amount(event, event.capacity) + unit + " static";
         case EventKind::break_away: {
-            // Located, it stands at its limit but for what locating leaves.
-            const bool at_limit = std::fabs(margin(event)) <= 1e-4 * event.capacity;
+            // Located, it stands at its limit but for what locating leaves. One that could hold more goes because others do.
+            const double left = margin(event), little = 1e-4 * event.capacity;
             return line + "breaks away: " + torque + amount(event, event.torque) +
-                   (at_limit ? " at its limit of " : " beyond ") + amount(event, event.capacity) + unit +
-                   " static";
+                   (left > little    ? " before others gave way, of "
+                    : left < -little ? " beyond "
+                                     : " at its limit of ") +
+                   amount(event, event.capacity) + unit + " static";
         }
         case EventKind::engage:
             return line + format("engages: slip %.3f", event.slip) + speed + ", capacity " +

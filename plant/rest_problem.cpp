@@ -164,21 +164,21 @@ bool set_up(const Work& w, RestProblem& rest) {
     return true;
 }
 
-// How much each joint gives where loads are shared out: the weights of build_mode().
-void set_gives(const ModelData& m, RestProblem& rest) {
+// How much each joint gives where loads are shared out: the less the larger its weight. Pairs weigh what they nominally hold,
+// each mesh `mesh_weight` times the heaviest of them.
+void set_gives(const ModelData& m, RestProblem& rest, double mesh_weight, double RestJoint::*give) {
     double heaviest = 0, most = 0;
     for (const FrictionPair& pair : m.structure.pairs) heaviest = std::max(heaviest, pair.nominal_capacity);
-    for (int pass = 0; pass < 2; ++pass) {
-        for (int i = 0; i < rest.count; ++i) {
-            RestJoint& joint = rest.joints[i];
-            const double weight =
-                joint.mesh < 0 ? m.structure.pairs[static_cast<std::size_t>(joint.device)].nominal_capacity
-                               : 1e-3 * (heaviest > 0 ? heaviest : 1);
-            const double give = 1 / (weight * joint.scale * joint.scale);
-            most = std::max(most, give);
-            joint.give = most_give * give / most;
-        }
+    const double of_mesh = mesh_weight * (heaviest > 0 ? heaviest : 1);
+    for (int i = 0; i < rest.count; ++i) {
+        RestJoint& joint = rest.joints[i];
+        const double weight = joint.mesh < 0
+                                  ? m.structure.pairs[static_cast<std::size_t>(joint.device)].nominal_capacity
+                                  : of_mesh;
+        joint.*give = 1 / (weight * joint.scale * joint.scale);
+        most = std::max(most, joint.*give);
     }
+    for (int i = 0; i < rest.count; ++i) rest.joints[i].*give *= most_give / most;
 }
 
 }  // namespace
@@ -211,12 +211,15 @@ bool pose_rest_problem(Work& w, const Mode& mode, int around, Sample& s,
     contact_forces(w, closed, s);
     free_torques(w, mode, s, rest.free);
     const bool posed = mode.tree ? set_up_trains(w, piece, rest) : set_up(w, rest);
-    if (posed) set_gives(m, rest);
+    if (posed) {
+        set_gives(m, rest, 1e-3, &RestJoint::give);  // as in build_mode()
+        set_gives(m, rest, 1e3, &RestJoint::give_on_losses);
+    }
     contact_forces(w, w.contact, s);
     return posed;
 }
 
-bool solve_rest_problem(bool shared_out, RestProblem& rest) SHIFTRIG_REALTIME {
+bool solve_rest_problem(Split split, RestProblem& rest) SHIFTRIG_REALTIME {
     const int count = rest.count, meshes = rest.mesh_rows, size = rest.size(), columns = lemke_columns(size);
     const auto row_of = [&](const double* matrix, int i) { return matrix + i * count; };
     // (I − H C) y = H M_0 + o + δ v − p, where M = M_0 + C y and H holds the slopes.
@@ -237,7 +240,9 @@ bool solve_rest_problem(bool shared_out, RestProblem& rest) SHIFTRIG_REALTIME {
     }
     const auto mobility = [&](int i, int j) {
         const double w = rest.w[i * count + j];
-        return shared_out && i == j ? w * (1 + rest.joints[i].give) : w;
+        if (split == Split::any || i != j) return w;
+        const RestJoint& joint = rest.joints[i];
+        return w * (1 + (split == Split::as_modes ? joint.give : joint.give_on_losses));
     };
     const auto turns = [&](int mesh_row, int j) {
         double sum = 0;

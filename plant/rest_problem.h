@@ -27,15 +27,15 @@ constexpr int most_joints = 16;
 // A pair or a mesh at rest.
 struct RestJoint {
     int device = -1;
-    int mesh = -1;                // its number among all meshes, −1: a pair
-    int row = -1;                 // where its torque stands in RestProblem::mesh
-    int bend = -1;                // its number among the meshes at rest
-    double upper = 0, lower = 0;  // limits of a pair, set by whoever asks; of a mesh o and −o
-    double slope = 0;             // 1 − η
-    double difference = 0;        // δ
-    double kink = 0;              // κ
-    double scale = 1;             // √W_ii: torques are counted in 1/scale, accelerations in scale
-    double give = 0;              // of W_ii, where loads are shared out
+    int mesh = -1;                        // its number among all meshes, −1: a pair
+    int row = -1;                         // where its torque stands in RestProblem::mesh
+    int bend = -1;                        // its number among the meshes at rest
+    double upper = 0, lower = 0;          // limits of a pair, set by whoever asks; of a mesh o and −o
+    double slope = 0;                     // 1 − η
+    double difference = 0;                // δ
+    double kink = 0;                      // κ
+    double scale = 1;                     // √W_ii: torques are counted in 1/scale, accelerations in scale
+    double give = 0, give_on_losses = 0;  // of W_ii, where loads are shared out
 };
 
 // Trains of gears by position, see tree_rest.cpp.
@@ -87,10 +87,16 @@ bool set_up_trains(const Work& work, const Piece& piece, RestProblem& rest) SHIF
 // How the loss of a mesh acts on its masses.
 std::array<Link, 2> loss_links(const Mesh& mesh) SHIFTRIG_REALTIME;
 
-// Solves it with the limits as they stand; leaves the torques of its solution in y and `torque`. `shared_out`: every
-// joint gives a little under its torque, the less the larger its nominal capacity. Of all splits of a load that is not unique
-// that is the one which the mode of the same states has. False: no solution was found.
-bool solve_rest_problem(bool shared_out, RestProblem& rest) SHIFTRIG_REALTIME;
+// How a load is split where mechanics leaves that open.
+enum class Split {
+    any,  // a corner of what is possible, which one depends on signs and order: for accelerations, which are unique
+    as_modes,  // every joint gives a little under its torque, the less the larger its nominal capacity: as the mode of the
+    // same states has it
+    on_losses,  // so too, but meshes give next to nothing: their losses carry what they can
+};
+
+// Solves it with the limits as they stand; leaves the torques of its solution in y and `torque`. False: no solution was found.
+bool solve_rest_problem(Split split, RestProblem& rest) SHIFTRIG_REALTIME;
 
 // Where joint i of the solution is: 0 within its limits, +1 at the upper one, −1 at the lower one. `going`: its acceleration,
 // as a share of what there could be.

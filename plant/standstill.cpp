@@ -82,7 +82,7 @@ struct Search {
         }
     }
 
-    bool solve(bool shared_out) {
+    bool solve(Split split) {
         for (int i = 0; i < rest.count; ++i) {
             RestJoint& joint = rest.joints[i];
             if (joint.mesh < 0) set_limits(w, s, joint);
@@ -91,11 +91,12 @@ struct Search {
             if (limit > 0) joint.upper = std::min(joint.upper, limit);
             if (limit < 0) joint.lower = std::max(joint.lower, limit);
         }
-        return solve_rest_problem(shared_out, rest);
+        return solve_rest_problem(split, rest);
     }
 
     bool solve_exactly() {
-        if (!solve(false)) return false;
+        // In a corner that many splits share the exact problem may lead nowhere; that little give does not matter then.
+        if (!solve(Split::any) && !solve(Split::as_modes)) return false;
         goes = false;
         for (int i = 0; i < rest.count; ++i) {
             double share;
@@ -124,11 +125,31 @@ struct Search {
         });
     }
     // What does not go shares out its load.
-    bool attempt_shared() {
-        return solve(true) && attempt([&](int i) {
+    bool attempt_shared(Split split) {
+        return solve(split) && attempt([&](int i) {
                    double share;
                    return going[i] ? vertex[i] : state_of(rest, i, side_of(rest, i, share));
                });
+    }
+    // Pairs that go, or else those at their limit as modes share the load, break away if they pass less on sliding: the others
+    // have to do with that. Did any?
+    bool break_more_away() {
+        bool breaks = false;
+        const auto consider = [&](int i, double sense) {
+            const RestJoint& joint = rest.joints[i];
+            if (joint.mesh >= 0 || sense == 0 || !has_reserve(joint.device, sense)) return;
+            break_away(i);
+            breaks = true;
+        };
+        for (int i = 0; i < rest.count; ++i) {
+            if (going[i] && rest.joints[i].mesh < 0) consider(i, slip_sign(vertex[i]));
+        }
+        if (breaks || !solve(Split::as_modes)) return breaks;
+        for (int i = 0; i < rest.count; ++i) {
+            double share;
+            if (!going[i]) consider(i, side_of(rest, i, share));
+        }
+        return breaks;
     }
 
     bool find() {
@@ -145,36 +166,36 @@ struct Search {
                 break_away(giving);
                 continue;
             }
-            if (attempt_least() || attempt_shared()) return true;
-            // A pair at its limit that passes less on sliding breaks away: the others have to do with that.
-            bool breaks = false;
-            for (int i = 0; i < rest.count; ++i) {
-                const RestJoint& joint = rest.joints[i];
-                if (joint.mesh >= 0 || vertex[i] == locked) continue;
-                if (!has_reserve(joint.device, slip_sign(vertex[i]))) continue;
-                break_away(i);
-                breaks = true;
-            }
-            if (!breaks) return attempt([&](int i) { return vertex[i]; });
+            if (attempt_least() || attempt_shared(Split::as_modes) || attempt_shared(Split::on_losses))
+                return true;
+            if (!break_more_away()) return attempt([&](int i) { return vertex[i]; });
         }
     }
 
+    // The one that gave way comes first, what follows from that after it.
     void tell(const unsigned char* found) {
+        const Mode& then = find_mode(w.model, w.operators, found, w.scratch);
+        if (gives_way >= 0) tell(found, then, gives_way);
         for (int k = 0; k < w.model.first_flank; ++k) {
-            const bool pair = k < w.model.pairs;
-            const bool was = w.contact[k] == closed, is = found[k] == closed;
-            if (was == is) continue;
-            if (pair) {
-                const double limit = was ? static_limit(w, k, s) : s.holding[k];
-                log_event(w, {s.at.time, was ? EventKind::break_away : EventKind::lock, device_index(k),
-                              s.torque[k], limit});
-                if (was) overcome(k) = 1;
-            } else if (was) {
-                const LossAtRest loss = loss_at_rest(w, k - w.model.pairs, s);
-                log_release(w, k, s.at.time, loss);
-            } else {
-                log_event(w, {s.at.time, EventKind::mesh_sticks, device_index(k)});
-            }
+            if (k != gives_way) tell(found, then, k);
+        }
+    }
+    void tell(const unsigned char* found, const Mode& then, int k) {
+        const bool pair = k < w.model.pairs;
+        const bool was = w.contact[k] == closed, is = found[k] == closed;
+        if (was == is) return;
+        if (pair) {
+            const double limit = was ? static_limit(w, k, s) : s.holding[k];
+            log_event(w, {s.at.time, was ? EventKind::break_away : EventKind::lock, device_index(k),
+                          s.torque[k], limit});
+            if (was) overcome(k) = 1;
+        } else if (then.bound[k]) {
+            return;  // others hold it: its loss has another share in that
+        } else if (was) {
+            const LossAtRest loss = loss_at_rest(w, k - w.model.pairs, s);
+            log_release(w, k, s.at.time, loss);
+        } else {
+            log_event(w, {s.at.time, EventKind::mesh_sticks, device_index(k)});
         }
     }
 };
@@ -193,9 +214,10 @@ Rearrangement rearrange(Work& w, int gives_way, int around, Sample& s) SHIFTRIG_
     const bool found = search.find();
     contact_forces(w, w.contact, s);
     internal_torques(w, find_mode(m, w.operators, w.contact, w.scratch), s);
-    // Meshes of one motion that share their losses in another way are no change; when they go, release_drive() says.
+    // Meshes of one motion that share their losses in another way are no change, unless they relieve a pair; when they go,
+    // release_drive() says.
     const unsigned char* const trial = w.scratch.trial.data();
-    const int relevant = search.goes ? m.contact_bytes : m.pairs;
+    const int relevant = search.goes || gives_way >= 0 ? m.contact_bytes : m.pairs;
     if (!found || std::equal(trial, trial + relevant, w.contact)) {
         search.forget();
         return Rearrangement::none;

@@ -117,15 +117,30 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
     return turned;
 }
 
+namespace {
+
+// A locked pair at its limit gives way, unless meshes at rest or other pairs take its load. Does anything move?
+bool give_way(Work& w, int pair, Sample& s) {
+    constexpr double at_its_limit = 1e-5;
+    Mode* mode = &find_mode(w.model, w.operators, w.contact, w.scratch);
+    if (mode->rests) {
+        // The loss of a mesh at rest turns unseen within a step, and allows more or less then.
+        mode = &find_directions(w, w.contact, s);
+        if (static_margin(w, pair, s) > at_its_limit * static_limit(w, pair, s)) return false;
+    }
+    if (lean_on_losses(w, *mode, most_used(w, w.contact, s), s)) return false;
+    const Rearrangement found = rearrange(w, pair, pair, s);
+    if (found == Rearrangement::none) open_pair(w, *mode, pair, s);
+    return found != Rearrangement::stands;
+}
+
+}  // namespace
+
 bool change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
     if (device >= w.model.first_flank) {
         change_flank(w, backlash_of(w, device), s);
     } else if (device < w.model.pairs && w.contact[device] == locked) {
-        const Mode& mode = find_mode(w.model, w.operators, w.contact, w.scratch);
-        if (lean_on_losses(w, mode, most_used(w, w.contact, s), s)) return false;
-        const Rearrangement found = rearrange(w, device, device, s);
-        if (found == Rearrangement::none) open_pair(w, mode, device, s);
-        return found != Rearrangement::stands;
+        return give_way(w, device, s);
     } else {
         close_device(w, device, s);
     }
@@ -150,12 +165,19 @@ void change_all(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     unsigned char* verdict = w.scratch.violations.data();
     for (int k = 0; k < w.model.first_flank; ++k)
         verdict[k] = !violated(w, mode, k, s) ? good : is_closed(k) ? opens : closes;
+    bool changed = false;
     for (int k = 0; k < w.model.first_flank; ++k) {
-        // One that closes may have brought others to rest with it: these are where they were to go.
         if (verdict[k] == opens && k < w.model.pairs) {
-            open_pair(w, find_mode(w.model, w.operators, w.contact, w.scratch), k, s);
+            // Those before it may have taken its load.
+            if (changed) internal_torques(w, find_mode(w.model, w.operators, w.contact, w.scratch), s);
+            if (w.contact[k] != locked || !is_overloaded(w, k, s)) continue;
+            give_way(w, k, s);
+            changed = true;
         } else if (verdict[k] == closes && !is_closed(k)) {
+            // One that closes may have brought others to rest with it: these are where they were to go.
             close_device(w, k, s);
+            contact_forces(w, w.contact, s);
+            changed = true;
         }
     }
     // A join with residual slip may have turned others round.
