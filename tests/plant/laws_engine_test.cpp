@@ -205,5 +205,27 @@ TEST(EngineInAMachine, StartsAndStallsTheSameWhetherTheLastStepIsRememberedOrNot
     EXPECT_TRUE(stalled);
 }
 
+// The boost follows the torque there is, whether a lag holds that or it is the demand itself.
+TEST(Engine, WithoutActuatorLagTheTurboRespondsAsWell) {
+    Engine e = reference_engine();
+    e.actuator_lag = 0;
+    const double speed = 1500 * rpm, full = full_load(e, speed);
+    EXPECT_GT(settle(e, throttle(1), speed).boost, 0.99);
+    EngineState state = settle(e, throttle(1), speed);
+    EXPECT_NEAR(
+        engine_drive(e, engine_setting(e, peak, throttle(1)), state, EngineMode::running, speed, full).torque,
+        full, 0.01 * full);
+}
+
+// One whose torque fades in below the speed at which it stalls would start and stall at once.
+TEST(Engine, IsCrankedBeyondTheSpeedAtWhichItStalls) {
+    Engine e = reference_engine();
+    e.fade_from = 300 * rpm;
+    e.fade_to = 200 * rpm;
+    double time = 0;
+    EXPECT_EQ(next_engine_mode(e, EngineMode::cranking, 350 * rpm, false, 1e-3, time), EngineMode::cranking);
+    EXPECT_EQ(next_engine_mode(e, EngineMode::cranking, 401 * rpm, false, 1e-3, time), EngineMode::running);
+}
+
 }  // namespace
 }  // namespace shiftrig::plant

@@ -71,6 +71,17 @@ TEST(DryFriction, FallsByItsShareOrFollowsItsTable) {
     EXPECT_NEAR(static_capacity(rising, 10), 10, 1e-15);
 }
 
+// Continued beyond its last point it would drive.
+TEST(DryFriction, ATableThatFallsEndsAtNothing) {
+    DryFriction p;
+    p.sliding_capacity = 10;
+    p.factor_over_slip = {{0, 1}, {20, 0.5}, {30, 0.1}};
+    const FrictionLaw law = friction_law(p);
+    EXPECT_NEAR(sliding_factor(law, 31), 0.06, 1e-12);
+    EXPECT_EQ(sliding_factor(law, 100), 0);
+    EXPECT_EQ(sliding_factor(law, -100), 0);
+}
+
 TEST(Oil, ViscosityAndItsEffectsAtWarmAndCold) {
     const Oil oil = reference_oil();
     EXPECT_NEAR(viscosity(oil, 0), 0.5, 1e-15);

@@ -233,6 +233,18 @@ TEST(Piston, RestsWhereTheSpringBalancesAPartialPressure) {
     EXPECT_NEAR(rig.state.chamber, 0, 1e-3);
 }
 
+// On a spring of no stiffness every place balances the return pressure: the pressure rests while the piston moves.
+TEST(Piston, IsNotQuietWhileItMoves) {
+    ActuationHydraulic p = reference_valve(true);
+    p.preload_pressure = p_return;
+    Rig rig(p, 1e-3, {}, p_return);
+    rig.state.piston = 0;
+    const std::size_t slots = rig.line.size();
+    EXPECT_FALSE(is_quiet(p, p_return, rig.state, slots, p_return));
+    rig.state.piston = p.stroke;
+    EXPECT_TRUE(is_quiet(p, p_return, rig.state, slots, p_return));
+}
+
 TEST(Piston, EmptiesBeforeItCanFillAgain) {
     Rig rig(reference_valve(true), 1e-3, {}, 12 * bar);
     EXPECT_EQ(rig.state.piston, 2e-3);

@@ -79,6 +79,18 @@ TEST(PickUp, MissingToothHalvesTheReadingOncePerTurn) {
     EXPECT_GT(full, 2800);
 }
 
+// However many teeth pass in a step.
+TEST(PickUp, MissingTeethAreCountedThroughWholeTurns) {
+    SpeedSensor p;
+    p.ideal = false;
+    p.teeth = 250;
+    SensorState state;
+    state.since_edge = 0;
+    constexpr double speed = 600, h = 0.05;  // 4.8 turns, 1194 teeth
+    advance_pickup(p, state, speed, speed, h, 1);
+    EXPECT_NEAR(state.reading, speed * 1189 / 1193, 1e-9);
+}
+
 TEST(PickUp, IdealCopiesTheSpeed) {
     SpeedSensor ideal;
     SensorState state;

@@ -47,6 +47,91 @@ TEST(Validation, TheReturnSpringOfAPistonDoesNotWeakenAlongItsStroke) {
     EXPECT_EQ(refusal(wet_clutch(5e5, 0)), "") << "without a piston nobody asks for it";
 }
 
+// Held less than it passes, a pair would lock and break away without end.
+TEST(Validation, WhatHoldsIsNotLessThanWhatSlidesAtRest) {
+    Description d = wet_clutch(0.8e5, 0);
+    auto& plates = std::get<WetPlates>(d.clutches[0].friction);
+    plates.mu_static = 0.125;  // 0.10 + 0.025
+    EXPECT_EQ(refusal(d), "");
+    plates.mu_static = 0.12;
+    EXPECT_EQ(
+        refusal(d),
+        "clutch \"F2\": mu_static = 0.12; must be >= 0.125, what slides at rest (mu_sliding + mu_rise)");
+    plates.mu_rise = -0.05;
+    EXPECT_EQ(refusal(d), "") << "friction that rises with slip is least at rest";
+}
+
+TEST(Validation, PressuresArePossible) {
+    Description d = wet_clutch(0.8e5, 0);
+    auto& valve = std::get<ActuationHydraulic>(d.clutches[0].actuation);
+    valve.initial = 60e5;
+    EXPECT_EQ(refusal(d), "clutch \"F2\": initial = 6000000; must be within 0 and 1800000");
+    valve.initial = valve.maximum_pressure;
+    EXPECT_EQ(refusal(d), "");
+    valve.initial = 0;
+    valve.maximum_pressure = 1.2e5;
+    EXPECT_EQ(refusal(d),
+              "clutch \"F2\": maximum_pressure = 120000; must be > return_pressure, which it works against");
+    d.clutches[0] = clutch("F2", "left", "right", 1, 1, ActuationApply{0.1, false, 5});
+    EXPECT_EQ(refusal(d), "clutch \"F2\": initial = 5; must be within 0 and 1");
+}
+
+// Nothing converts between an inertia and a body but what has a radius or a ratio.
+TEST(Validation, WhatIsJoinedMovesAlike) {
+    Description d;
+    d.masses = {mass("wheel", 1), {"body", 100, Motion::translating}};
+    d.shafts = {{.name = "rod", .a = "wheel", .b = "body", .stiffness = 1e4}};
+    EXPECT_EQ(refusal(d), "shaft \"rod\": b = \"body\"; must be a rotating mass, as the other end is");
+    d.shafts.clear();
+    d.clutches = {clutch("C", "body", "wheel", 10)};
+    EXPECT_EQ(refusal(d), "clutch \"C\": b = \"wheel\"; must be a translating mass, as the other end is");
+    d.clutches[0].a = "wheel";
+    d.clutches[0].b = "body";
+    d.clutches[0].radius = 0.5;
+    EXPECT_EQ(refusal(d), "");
+    d.sensors = {{.name = "pick-up", .mass = "body", .ideal = false, .teeth = 60}};
+    EXPECT_EQ(refusal(d), "sensor \"pick-up\": mass = \"body\"; must be a rotating mass to have teeth");
+    d.sensors[0].ideal = true;
+    EXPECT_EQ(refusal(d), "");
+}
+
+TEST(Validation, AnEngineFadesBelowWhereItPulls) {
+    Description d;
+    d.masses = {mass("crank", 1)};
+    Engine e;
+    e.name = "diesel";
+    e.mass = "crank";
+    e.full_load = {{50, 300}, {200, 400}};
+    e.governor_slope = 20;
+    e.low_idle = 90;
+    e.high_idle = 220;
+    e.fade_from = 60;
+    e.fade_to = 40;
+    d.engines = {e};
+    EXPECT_EQ(refusal(d), "");
+    d.engines[0].fade_to = 70;
+    EXPECT_EQ(refusal(d), "engine \"diesel\": fade_to = 70; must be < fade_from");
+    d.engines[0] = e;
+    d.engines[0].full_load[0].second = -10;
+    EXPECT_EQ(refusal(d), "engine \"diesel\": full_load = -10; must be >= 0");
+}
+
+TEST(Validation, OptionsOfGearsCombineToNoMoreThanCanBeLookedAt) {
+    Description d;
+    d.masses = {mass("m0", 1)};
+    const std::vector<std::pair<std::string, double>> four = {{"A", 1}, {"B", 2}, {"C", 3}, {"D", 4}};
+    for (int k = 1; k <= 5; ++k) {
+        const std::string here = std::to_string(k), before = std::to_string(k - 1);
+        d.masses.push_back(mass("m" + here, 1));
+        d.gears.push_back(lossy_gear("g" + here, "m" + before, "m" + here, 1, 1, 0));
+        d.gears.back().options = four;
+    }
+    d.gears[4].options.clear();
+    EXPECT_EQ(refusal(d), "");  // 256
+    d.gears[4].options = four;
+    EXPECT_EQ(refusal(d), "model \"\": gears have 1024 combinations of options; must be 1000 at most");
+}
+
 TEST(Validation, OnePedalHasOnePosition) {
     Description d;
     d.masses = {mass("left", 1), mass("right", 2)};

@@ -93,9 +93,9 @@ test("the dashboard follows the driver, shows a fault and gives the recording", 
 
   // A parameter is changed while it runs, and the change is an event.
   await page.click("summary:text-is('F2')");
-  await page.locator("[data-parameter='clutches.F2.wet_plates.mu_sliding']").fill("0.11");
+  await page.locator("[data-parameter='clutches.F2.wet_plates.mu_sliding']").fill("0.09");
   await page.locator("[data-parameter='clutches.F2.wet_plates.mu_sliding'] + button").click();
-  await until("the parameter's event", async () => /mu_sliding is set to 0.11/.test(await page.textContent("[aria-label='Events']")));
+  await until("the parameter's event", async () => /mu_sliding is set to 0.09/.test(await page.textContent("[aria-label='Events']")));
 
   const download = page.waitForEvent("download");
   await page.click("[data-role='download']");

@@ -27,7 +27,7 @@ double slip_factor(const plant::DryFriction& law, double slip) {
     while (right + 1 < table.size() && table[right].first < slip) ++right;
     const auto& [x0, y0] = table[right - 1];
     const auto& [x1, y1] = table[right];
-    return y0 + (y1 - y0) * (slip - x0) / (x1 - x0);
+    return std::max(0.0, y0 + (y1 - y0) * (slip - x0) / (x1 - x0));
 }
 
 Friction friction_of(const plant::Clutch& clutch, const System& system) {

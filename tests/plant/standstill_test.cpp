@@ -1,0 +1,154 @@
+// What gives way where several devices hold something at rest together, and that the sense of the load does not matter.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/plant/rig.h"
+
+namespace shiftrig::plant {
+namespace {
+
+Waveform ramp(double slope, double until = 1e300) {
+    Waveform wave{{{.from = 0, .until = until, .slope = slope}}};
+    if (until < 1e300) wave.pieces.push_back({.from = until, .offset = slope * until});
+    return wave;
+}
+
+Clutch brake(const char* name, const char* mass, double sliding, double static_ratio) {
+    Clutch c = clutch(name, mass, "", sliding, static_ratio);
+    c.initially_locked = true;
+    return c;
+}
+
+// The same machine with every speed and every torque turned round.
+Description mirrored(Description d) {
+    for (Mass& mass : d.masses) mass.initial_speed = -mass.initial_speed;
+    for (TorqueSource& source : d.sources) {
+        for (Waveform::Piece& piece : source.waveform.pieces) {
+            piece.offset = -piece.offset;
+            piece.slope = -piece.slope;
+            piece.amplitude = -piece.amplitude;
+        }
+    }
+    return d;
+}
+
+// Events and final speeds of both.
+struct Both {
+    Both(const Description& d, double until, const BuildOptions& options = {})
+        : forward(d, options), backward(mirrored(d), options) {
+        forward.run(until);
+        backward.run(until);
+    }
+    void expect_mirror_images() const {
+        ASSERT_EQ(forward.events.size(), backward.events.size());
+        for (std::size_t i = 0; i < forward.events.size(); ++i) {
+            EXPECT_EQ(forward.events[i].kind, backward.events[i].kind) << i;
+            EXPECT_EQ(forward.events[i].device, backward.events[i].device) << i;
+            EXPECT_NEAR(forward.events[i].time, backward.events[i].time, 1e-9) << i;
+        }
+        for (std::size_t j = 0; j < forward.state.speeds().size(); ++j)
+            EXPECT_NEAR(forward.state.speeds()[j], -backward.state.speeds()[j], 1e-9) << j;
+    }
+    Rig forward, backward;
+};
+
+// They share the load in equal parts. At 54.6 Nm the weaker one is at its 27.3 Nm, passes 21 from then on, and 33.6 Nm are more
+// than the other can hold.
+TEST(Standstill, TwoBrakesGiveWayWhereTheOneThatBreaksAwayLeavesTooMuch) {
+    Description d;
+    d.masses = {mass("m", 0.5)};
+    d.clutches = {brake("B0", "m", 21, 1.3), brake("B1", "m", 21, 33. / 21)};
+    d.sources = {source("m", ramp(55.5, 1))};
+    const Both both(d, 1.5);
+    both.expect_mirror_images();
+    ASSERT_EQ(both.forward.times(EventKind::break_away, "B0").size(), 1u);
+    EXPECT_NEAR(both.forward.times(EventKind::break_away, "B0")[0], 54.6 / 55.5, 1e-6);
+    EXPECT_EQ(both.forward.times(EventKind::break_away, "B1").size(), 1u);
+}
+
+// The other one can hold what is left: nothing moves.
+TEST(Standstill, OneOfTwoBrakesBreaksAwayAndTheOtherHolds) {
+    Description d;
+    d.masses = {mass("m", 0.5)};
+    d.clutches = {brake("B0", "m", 21, 1.3), brake("B1", "m", 21, 2)};
+    d.sources = {source("m", ramp(55.5, 1))};
+    const Both both(d, 1.5);
+    both.expect_mirror_images();
+    EXPECT_EQ(both.forward.times(EventKind::break_away, "B0").size(), 1u);
+    EXPECT_TRUE(both.forward.times(EventKind::break_away, "B1").empty());
+    EXPECT_EQ(both.forward.state.speeds()[0], 0);
+    EXPECT_NEAR(both.forward.out("clutch.B1.torque"), 55.5 - 21, 1e-9);
+}
+
+TEST(Standstill, TwoBrakesWithAGearBetweenThem) {
+    Description d;
+    d.masses = {mass("m0", 0.011), mass("m1", 0.2978)};
+    d.gears = {lossy_gear("g", "m0", "m1", 2.55, 1, 0)};
+    d.clutches = {brake("c4", "m1", 4.88, 2), brake("c5", "m0", 13.68, 1.3)};
+    d.sources = {source("m0", ramp(100))};
+    const Both both(d, 0.25);
+    both.expect_mirror_images();
+    EXPECT_NEAR(both.forward.times(EventKind::break_away, "c5").at(0), 0.1875957, 1e-6);
+}
+
+// A mass on a clutch turns its slip round against another, which a brake holds through a lossy gear. What the clutch passes is
+// within what brake and gear hold, but not as their mode shares it: the losses have to carry what they can.
+TEST(Standstill, ABrakeHoldsWhatTheLossesOfItsGearLeaveIt) {
+    Description d;
+    d.masses = {mass("m0", 0.124), mass("m1", 0.1), mass("m3", 0.9, 5)};
+    d.gears = {lossy_gear("g", "m0", "m1", -1.065, 0.7, 2.1)};
+    d.clutches = {clutch("c2", "m3", "m0", 26.78, 1.3), brake("c5", "m1", 59.67, 2)};
+    auto& falling = std::get<DryFriction>(d.clutches[0].friction);
+    falling.falling = 0.48;
+    falling.falling_speed = 1.16;
+    d.sources = {source("m0", constant(-41)), source("m1", constant(47.4)), source("m3", constant(-144))};
+    const Both both(d, 0.1);
+    both.expect_mirror_images();
+    for (const Rig* rig : {&both.forward, &both.backward}) {
+        EXPECT_EQ(rig->times(EventKind::break_away, "c2").size(), 1u);
+        EXPECT_TRUE(rig->times(EventKind::break_away, "c5").empty());
+        EXPECT_EQ(rig->state.speeds()[0], 0);
+    }
+    EXPECT_NEAR(both.forward.state.speeds()[2], -10.2875, 1e-4);
+}
+
+// The simple rule looks at the ends of steps, but then asks the same of what holds together.
+TEST(Standstill, TheNextStepRuleLetsOthersTakeALoadAsWell) {
+    Description d;
+    d.masses = {mass("m", 0.5)};
+    d.clutches = {brake("B0", "m", 21, 1.3), brake("B1", "m", 21, 2)};
+    d.sources = {source("m", ramp(55.5, 1))};
+    d.transition = Transition::next_step;
+    const Both both(d, 1.5);
+    both.expect_mirror_images();
+    EXPECT_EQ(both.forward.state.speeds()[0], 0);
+}
+
+// Friction that rises with slip over a tenth of a metre a second, on 0.02 kg m²: a time constant of 20 µs. The load is more than
+// rest takes and less than sliding does, so it ends creeping and never locks.
+TEST(Standstill, ASlipThatIsHeldUpDoesNotLock) {
+    for (const double speed : {3., 13., 30.}) {
+        Description d;
+        d.masses = {mass("a", 0.02, speed), mass("b", 5)};
+        Clutch c = clutch("F", "a", "b", 2589);
+        auto& friction = std::get<DryFriction>(c.friction);
+        friction.falling = -0.625;  // of 1593 Nm at rest
+        friction.sliding_capacity = 1593;
+        friction.static_ratio = 1.63;
+        friction.falling_speed = 1.02;
+        d.clutches = {c};
+        d.sources = {source("a", constant(1800)), source("b", constant(-1800))};
+        Rig rig(d);
+        rig.run(0.1);
+        EXPECT_TRUE(rig.times(EventKind::lock, "F").empty()) << speed;
+        const double slip = rig.state.speeds()[0] - rig.state.speeds()[1];
+        EXPECT_GT(slip, 0.1) << speed;
+        EXPECT_LT(slip, 1) << speed;
+    }
+}
+
+}  // namespace
+}  // namespace shiftrig::plant
