@@ -20,18 +20,21 @@ std::string milliseconds(double seconds) {
     return format("%.3g ms", 1e3 * seconds);
 }
 
+// Inertias among themselves, bodies among themselves.
 void warn_of_inertia_ratio(const Description& d, std::vector<std::string>& warnings) {
     const auto smaller = [](const Mass& a, const Mass& b) { return a.inertia < b.inertia; };
-    std::vector<Mass> rotating;
-    for (const Mass& mass : d.masses) {
-        if (mass.motion == Motion::rotating) rotating.push_back(mass);
+    for (const Motion motion : {Motion::rotating, Motion::translating}) {
+        std::vector<Mass> alike;
+        for (const Mass& mass : d.masses) {
+            if (mass.motion == motion) alike.push_back(mass);
+        }
+        if (alike.empty()) continue;
+        const auto [low, high] = std::minmax_element(alike.begin(), alike.end(), smaller);
+        if (high->inertia <= 1e7 * low->inertia) continue;
+        warnings.push_back("masses \"" + low->name + "\" and \"" + high->name + "\": inertia ratio " +
+                           format("%.3g", high->inertia / low->inertia) +
+                           " is beyond 1e7: joins and internal torques lose digits");
     }
-    if (rotating.empty()) return;
-    const auto [low, high] = std::minmax_element(rotating.begin(), rotating.end(), smaller);
-    if (high->inertia <= 1e7 * low->inertia) return;
-    warnings.push_back("masses \"" + low->name + "\" and \"" + high->name + "\": inertia ratio " +
-                       format("%.3g", high->inertia / low->inertia) +
-                       " is beyond 1e7: joins and internal torques lose digits");
 }
 
 // ---- forces that answer speed ---------------------------------------------------------------------
@@ -41,17 +44,17 @@ class Answers {
     Answers(const Model& model, std::vector<std::string>& warnings)
         : d_(model.description()),
           s_(model.data().structure),
+          laws_(model.data().pair_laws),
           motions_(swinging_motions(d_, s_, {})),
           step_(model.step_size()),
           part_(shortest_part(model)),
           warnings_(warnings) {}
 
     void of(const Clutch& clutch) {
-        const auto* dry = std::get_if<DryFriction>(&clutch.friction);
-        if (!dry) return;
-        const FrictionLaw law = friction_law(*dry);
-        const double slope = load_from_engagement(law, 1) * steepness(law).rise;
-        const auto links = s_.pairs[static_cast<std::size_t>(s_.pair(clutch.name))].links;
+        const auto pair = static_cast<std::size_t>(s_.pair(clutch.name));
+        const detail::PairLaw& law = laws_[pair];
+        const double slope = law.full_load * steepness(law.friction).rise;
+        const auto& links = s_.pairs[pair].links;
         say("clutch \"" + clutch.name + "\": its friction rises by " + format("%.3g", slope) +
                 " Nm s/rad and so slows its lighter mass within ",
             1 / (slope * mobility(links[0], links[1])));
@@ -109,6 +112,7 @@ class Answers {
 
     const Description& d_;
     const Structure& s_;
+    const std::vector<detail::PairLaw>& laws_;
     Eigen::MatrixXd motions_;  // everything open: where bodies are lightest
     double step_, part_;
     std::vector<std::string>& warnings_;

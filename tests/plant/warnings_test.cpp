@@ -227,6 +227,40 @@ TEST(Warnings, NameFrictionThatIsTooSteep) {
     EXPECT_EQ(warnings_of(d, 1e-4), Lines{});
 }
 
+// Wet plates as well: 3089 Nm per 0.13 at full pressure, of which 0.05 comes within 0.1 m/s at 98 mm.
+TEST(Warnings, NameWetFrictionThatIsTooSteep) {
+    Description d;
+    d.masses = {mass("light", 1e-3), mass("heavy", 1)};
+    Clutch c = machines::clutch("F", "light", "heavy");
+    WetPlates plates = powershift_plates();
+    plates.mu_sliding = 0.13;
+    plates.mu_rise = -0.05;
+    plates.mu_speed = 0.1;
+    c.friction = plates;
+    ActuationHydraulic valve;
+    valve.natural_frequency = 60;
+    valve.damping_ratio = 0.8;
+    valve.slew = 150e5;
+    valve.maximum_pressure = 18e5;
+    c.actuation = valve;
+    d.clutches = {c};
+    d.maximum_parts = 1;
+    const Lines lines = warnings_of(d);
+    ASSERT_EQ(lines.size(), 1u);
+    EXPECT_EQ(lines[0].rfind("clutch \"F\": its friction rises by ", 0), 0u) << lines[0];
+    std::get<WetPlates>(d.clutches[0].friction).mu_rise = 0.025;
+    std::get<WetPlates>(d.clutches[0].friction).mu_static = 0.16;
+    EXPECT_EQ(warnings_of(d), Lines{});
+}
+
+TEST(Warnings, NameBodiesOfVeryDifferentMass) {
+    Description d;
+    d.masses = {machines::mass("dust", 1e-6, Motion::translating),
+                machines::mass("barge", 1e6, Motion::translating), mass("rotor", 1)};
+    EXPECT_EQ(warnings_of(d), Lines{"masses \"dust\" and \"barge\": inertia ratio 1e+12 is beyond 1e7: joins "
+                                    "and internal torques lose digits"});
+}
+
 TEST(Warnings, NameForcesThatAnswerSpeedTooFast) {
     Description d = engine_on_a_shaft();
     d.shafts.clear();
