@@ -74,13 +74,12 @@ std::string explain(const Model& model, const Event& event) {
             return line + format("locks: slip %.3g, ", event.slip) + torque + amount(event, event.torque) +
                    " of " + amount(event, event.capacity) + unit + " static";
         case EventKind::break_away: {
-            // Located, it stands at its limit but for what locating leaves. One that could hold more goes because others do.
+            // Located, it stands at its limit but for what locating leaves. With something left it goes because others do in
+            // this instant, or because what it can hold falls.
             const double left = margin(event), little = 1e-4 * event.capacity;
-            return line + "breaks away: " + torque + amount(event, event.torque) +
-                   (left > little    ? " before others gave way, of "
-                    : left < -little ? " beyond "
-                                     : " at its limit of ") +
-                   amount(event, event.capacity) + unit + " static";
+            const char* const how = left > little ? " of " : left < -little ? " beyond " : " at its limit of ";
+            return line + "breaks away: " + torque + amount(event, event.torque) + how +
+                   amount(event, event.capacity) + unit + " static" + (left > little ? " just before" : "");
         }
         case EventKind::engage:
             return line + format("engages: slip %.3f", event.slip) + speed + ", capacity " +
