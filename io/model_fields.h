@@ -64,7 +64,7 @@ void fields(Fields& f, plant::Mass& m) {
 template <class Fields>
 void fields(Fields& f, plant::Shaft& s) {
     f.link("a", s.a, "mass at the first end");
-    f.link("b", s.b, "mass at the second end");
+    f.link_or_housing("b", s.b, "mass at the second end, or housing");
     f.number("stiffness_nm_per_rad", s.stiffness, positive, "torsional stiffness");
     f.number("damping_nm_s_per_rad", s.damping, not_negative, "damper parallel to the stiffness");
     f.optional_number("initial_twist_rad", s.initial_twist, any, "twist at the start, a ahead of b [0]");
@@ -73,7 +73,7 @@ void fields(Fields& f, plant::Shaft& s) {
 template <class Fields>
 void fields(Fields& f, plant::Backlash& b) {
     f.link("a", b.a, "mass at the first end");
-    f.link("b", b.b, "mass at the second end");
+    f.link_or_housing("b", b.b, "mass at the second end, or housing");
     f.number("stiffness_nm_per_rad", b.stiffness, positive, "of the closed flanks");
     f.number("damping_nm_s_per_rad", b.damping, not_negative, "damper parallel to it while they are closed");
     f.number("gap_rad", b.gap, positive, "the whole play, from flank to flank");

@@ -25,22 +25,31 @@ Eigen::VectorXd compatible_speeds(const ModelData& m, const Eigen::VectorXd& wan
                                   const std::vector<std::pair<int, double>>& pinned) {
     const Structure& s = m.structure;
     const Eigen::MatrixXd pairs = s.pair_columns(), meshes = s.mesh_columns(), shafts = s.shaft_columns();
+    const auto is_told = [&](int mass) {
+        return std::any_of(pinned.begin(), pinned.end(), [=](const auto& pin) { return pin.first == mass; });
+    };
     const auto n = static_cast<Eigen::Index>(m.masses);
     // What is not rigid follows as if it were: shafts untwisted, tyres rolling unless the body's speed is told.
     std::vector<std::size_t> rolling;
     for (std::size_t t = 0; following && t < m.tyres.size(); ++t) {
-        const auto told = [&](const auto& pin) { return pin.first == m.tyres[t].body; };
-        if (std::none_of(pinned.begin(), pinned.end(), told)) rolling.push_back(t);
+        if (!is_told(m.tyres[t].body)) rolling.push_back(t);
     }
-    const Eigen::Index rows = static_cast<Eigen::Index>(locked.size() + pinned.size() + rolling.size()) +
-                              meshes.cols() + (following ? shafts.cols() : 0);
+    // What a spring holds to the housing stands, unless its speed is told.
+    std::vector<Eigen::Index> untwisted;
+    for (Eigen::Index k = 0; following && k < shafts.cols(); ++k) {
+        const auto& links = s.shafts[static_cast<std::size_t>(k)].links;
+        if (links[1].mass >= 0 || !is_told(links[0].mass)) untwisted.push_back(k);
+    }
+    const Eigen::Index rows =
+        static_cast<Eigen::Index>(locked.size() + pinned.size() + rolling.size() + untwisted.size()) +
+        meshes.cols();
     if (rows == 0) return wanted;
     Eigen::MatrixXd c(rows, n);
     Eigen::VectorXd value = Eigen::VectorXd::Zero(rows);
     Eigen::Index row = 0;
     for (int k : locked) c.row(row++) = pairs.col(k).transpose();
     for (Eigen::Index k = 0; k < meshes.cols(); ++k) c.row(row++) = meshes.col(k).transpose();
-    for (Eigen::Index k = 0; following && k < shafts.cols(); ++k) c.row(row++) = shafts.col(k).transpose();
+    for (const Eigen::Index k : untwisted) c.row(row++) = shafts.col(k).transpose();
     for (const std::size_t t : rolling) {
         c.row(row).setZero();
         c(row, m.tyres[t].wheel) = m.description.tyres[t].radius;
@@ -84,11 +93,10 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
                     play = command;
                     command = interpolate(law.hydraulic->solenoid->pressure_over_current, command);
                 }
-                HydraulicState state =
-                    hydraulic_rest(*law.hydraulic, law.friction.return_pressure,
-                                   limited_command(*law.hydraulic, command),
-                                   std::span<double>(block + law.actuator + detail::hydraulic_slots,
-                                                     static_cast<std::size_t>(law.delay_slots)));
+                HydraulicState state = hydraulic_rest(
+                    *law.hydraulic, law.friction.return_pressure, limited_command(*law.hydraulic, command),
+                    std::span<double>(block + law.actuator + detail::hydraulic_slots,
+                                      static_cast<std::size_t>(law.delay_slots)));
                 state.play = play;
                 detail::write_hydraulic(block + law.actuator, state);
                 break;

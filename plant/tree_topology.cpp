@@ -76,6 +76,10 @@ class Builder {
         }
         for (std::size_t c = 0; c < connections_.size(); ++c) {
             const Connection& connection = connections_[c];
+            if (connection.b < 0) {
+                reason = "\"" + *connection.name + "\" is a spring to the housing";
+                return false;
+            }
             const int a = find(connection.a), b = find(connection.b);
             if (a == b) {
                 reason = "\"" + *connection.name + "\" closes a loop";

@@ -31,7 +31,7 @@ namespace shiftrig::plant {
 
 // Elastic shaft with play: within the gap it passes on nothing.
 struct Backlash {
-    std::string name, a, b;
+    std::string name, a, b;    // b empty: to the housing
     double stiffness = 0;      // of the closed flanks [Nm/rad], > 0
     double damping = 0;        // of the closed flanks [Nm s/rad], ≥ 0
     double gap = 0;            // the whole play [rad], > 0
@@ -71,7 +71,8 @@ inline const char* kind(const Backlash&) {
     return "backlash";
 }
 inline std::array<End, 2> ends(const Backlash& c) {
-    return {End{"a", c.a}, End{.field = "b", .mass = c.b, .motion = EndMotion::alike}};
+    return {End{"a", c.a},
+            End{.field = "b", .mass = c.b, .may_be_housing = true, .motion = EndMotion::alike}};
 }
 void check_parameters(const Check& check, const Backlash& device);
 void assemble(Assembly& assembly, const Backlash& device);
