@@ -84,11 +84,10 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
                     play = command;
                     command = interpolate(law.hydraulic->solenoid->pressure_over_current, command);
                 }
-                HydraulicState state =
-                    hydraulic_rest(*law.hydraulic, law.friction.return_pressure,
-                                   limited_command(*law.hydraulic, command),
-                                   std::span<double>(block + law.actuator + detail::hydraulic_slots,
-                                                     static_cast<std::size_t>(law.delay_slots)));
+                HydraulicState state = hydraulic_rest(
+                    *law.hydraulic, law.friction.return_pressure, limited_command(*law.hydraulic, command),
+                    std::span<double>(block + law.actuator + detail::hydraulic_slots,
+                                      static_cast<std::size_t>(law.delay_slots)));
                 state.play = play;
                 detail::write_hydraulic(block + law.actuator, state);
                 break;
