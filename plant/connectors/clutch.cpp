@@ -144,12 +144,12 @@ void check_surroundings(const Description& machine, const Clutch& c) {
 
 void assemble(Assembly& assembly, const Clutch& c) {
     const double b = c.radius > 0 ? -1 / c.radius : -1;
-    assembly.structure.pairs.push_back({c.name,
-                                        PairKind::clutch,
-                                        {assembly.link(c.a, 1), assembly.link(c.b, b)},
-                                        nominal_capacity(c),
-                                        c.radius > 0,
-                                        c.initially_locked});
+    assembly.structure.pairs.push_back({.name = c.name,
+                                        .kind = PairKind::clutch,
+                                        .links = {assembly.link(c.a, 1), assembly.link(c.b, b)},
+                                        .nominal_capacity = nominal_capacity(c),
+                                        .rolling_contact = c.radius > 0,
+                                        .initially_locked = c.initially_locked});
 }
 
 namespace {
