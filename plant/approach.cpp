@@ -85,7 +85,7 @@ Approached approach_margin(Work& w, const Mode& mode, const Crossing& crossing, 
 // damped flank begins with a jump of its torque, and contacts follow one another by hundreds: an instant that is late by
 // δ costs 2ζωδ of the speed of each. Newton's method, kept in the bracket, aims at the middle of what is near enough.
 Approached approach_flank(Work& w, const Mode& mode, const Crossing& crossing, double done,
-                      double until) SHIFTRIG_REALTIME {
+                          double until) SHIFTRIG_REALTIME {
     constexpr int most_steps = 12;
     const Sample& begin = w.scratch.begin();
     Sample& end = w.scratch.end();

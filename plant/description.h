@@ -96,8 +96,9 @@ struct Description {
     Method method = Method::automatic;
     int maximum_events = 4;  // K: located in one step, of its parts K each at most
     // A step is taken in up to this many parts where shafts swing or forces change too fast for one; 1: never.
-    // Both together bound the cost of a step, and are bounded for it. A backlash whose flanks are too stiff for that many raises both bounds, friction that changes
-    // too steeply over the slip the second, to 256 at most (not 1).
+    // Both together bound the cost of a step, and are bounded for it. Where they are too few for the machine its model has more
+    // (bound_step() in model_decisions.cpp): parts, if they are not 1, up to 256 for friction that changes too steeply over the
+    // slip, up to 16384 for flanks that swing too fast; of events each backlash adds 2 and 2 for every 3 rad of ωh.
     int maximum_parts = 16;
     static constexpr int most_events = 64, most_parts = 256;
 };

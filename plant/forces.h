@@ -15,7 +15,7 @@ struct Work {
     double* next;         // the same, to be written; null where one only looks
     Outputs& outputs;
     ScratchData& scratch;
-    unsigned char* contact;  // contact states in force, per pair and mesh
+    unsigned char* contact;  // contact states in force, per pair, mesh and flank
     double start;            // time at the start of the step [s]
     double h;                // [s]
 };

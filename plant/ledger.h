@@ -11,7 +11,9 @@ double stored_energy(const ModelData& model, const double* z) SHIFTRIG_REALTIME;
 double stored_energy(const ModelData& model, const double* z, const unsigned char* contact) SHIFTRIG_REALTIME;
 
 // Books the part of a step from `begin` to `end` in `mode`: input work, heat of every pair, all other
-// losses, way of the translating masses; by Simpson's rule with the middle state from Hermite's cubic.
+// losses, way of the translating masses; by Simpson's rule. The exponential engine takes the forces with which the step was
+// made and the motion that they gave half way, in as many parts as stiff shafts swing in; on a tree the motion half way is
+// Hermite's cubic and forces are taken anew (docs/mechanics.md, Account of energy).
 void book(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

@@ -203,9 +203,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
     std::fill(mode.loop, mode.loop + m.pairs, 0);
 
     // Ĉ, its unknowns scaled to unit columns (square case) or by √W (dependent rows).
-    double heaviest = 0;
-    for (const FrictionPair& pair : s.pairs) heaviest = std::max(heaviest, pair.nominal_capacity);
-    const double mesh_weight = 1e3 * (heaviest > 0 ? heaviest : 1);  // sharing is for friction pairs
+    const double mesh_weight = s.mesh_weight();
     double* g = force + n * m.torques;
     double* transmission = g + m.torques * m.torques;  // T̂, rows × masses
     double* right = transmission + rows * n;
@@ -225,9 +223,8 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
             length = scaled_column(m, mesh.column(mesh.force_ratio(exponent(m, mode, unknown - m.pairs))), c);
         } else {
             const Mesh& mesh = s.meshes[static_cast<std::size_t>(unknown - m.pairs - m.meshes)];
-            length = scaled_column(
-                m, std::array<Link, 2>{Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}}, c);
-            weight = 1e-6 * mesh_weight;
+            length = scaled_column(m, mesh.loss(), c);
+            weight = s.loss_weight();
         }
         // c is a unit column; the true one is length·c. Work with √W·length·c in the dependent case.
         scale[r] = mode.redundant ? std::sqrt(weight) : 1 / length;

@@ -92,7 +92,6 @@ void build_columns(ModelData& m) {
     for (const FrictionPair& pair : s.pairs) m.pair_slip.push_back(branchless(pair.links));
     for (const Mesh& mesh : s.meshes) m.mesh_motion.push_back(branchless(mesh.motion()));
     for (const Mesh& mesh : s.meshes) {
-        const double slope = mesh.forward_efficiency - 1 / mesh.backward_efficiency;
         const auto k = static_cast<int>(m.lossy.size());
         if (mesh.lossy()) {
             m.lossy_meshes.push_back(k);
@@ -100,14 +99,10 @@ void build_columns(ModelData& m) {
             m.lossless_gears.push_back(k);
         }
         m.lossy.push_back(mesh.lossy());
-        m.loss_kink.push_back(slope < 0 ? (mesh.forward_bearing - mesh.backward_bearing) / slope
-                                        : mesh.forward_bearing / 2);
+        m.loss_kink.push_back(mesh.loss_kink());
     }
     for (const Mesh& mesh : s.meshes) m.mesh_slip.push_back(branchless(mesh.column(mesh.ratio)));
-    for (const Mesh& mesh : s.meshes) {
-        m.mesh_loss.push_back(
-            branchless(std::array<Link, 2>{Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}}));
-    }
+    for (const Mesh& mesh : s.meshes) m.mesh_loss.push_back(branchless(mesh.loss()));
     for (const Elastic& shaft : s.shafts) m.shaft_rate.push_back(branchless(shaft.links));
     for (const Elastic& damper : s.dampers) m.damper_rate.push_back(branchless(damper.links));
 
@@ -115,8 +110,7 @@ void build_columns(ModelData& m) {
     for (const Mesh& mesh : s.meshes) {
         const bool bearing = mesh.forward_bearing > 0 || mesh.backward_bearing > 0;
         m.bearing_force.push_back(bearing ? static_cast<int>(m.force_columns.size()) : -1);
-        if (bearing)
-            m.force_columns.push_back({Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}});
+        if (bearing) m.force_columns.push_back(mesh.loss());
     }
     m.first_external = static_cast<int>(m.force_columns.size());
     m.external_force.assign(static_cast<std::size_t>(m.masses), -1);

@@ -120,7 +120,7 @@ struct ModelData {
     int auxiliary = 0;                               // tyre slips, engine torque and boost
     int contact_bytes = 0;                           // pairs, meshes, flanks
     int first_flank = 0;                             // contact byte: pairs + meshes
-    int maximum_events = 0, maximum_parts = 0;       // of a step, as described or as flanks need
+    int maximum_events = 0, maximum_parts = 0;       // of a step, as described or as flanks and friction need
     std::vector<std::array<Link, 2>> force_columns;  // how f_k acts *out of* the masses (SDM sign)
     // Slips and twist rates for the step: the housing is there mass 0 with factor 0, which needs no branch.
     std::vector<std::array<Link, 2>> pair_slip, mesh_motion, mesh_loss, shaft_rate, damper_rate, force_on;
@@ -129,11 +129,12 @@ struct ModelData {
     std::vector<int> lossy_meshes, lossless_gears;
     // Torque at which the loss lines of both directions cross, moving forward [Nm].
     std::vector<double> loss_kink;
-    bool depends_on_time = false;      // waveforms: forces are no function of state and inputs alone
-    std::vector<int> bearing_force;    // per mesh, −1: none
-    std::vector<int> external_force;   // per mass, −1: none
-    double drag_speed_limit = 0;       // of open clutches [rad/s]
-    double noteworthy_torque = 0;      // 1 % of the weakest clutch: less is idling [Nm]
+    bool depends_on_time = false;     // waveforms: forces are no function of state and inputs alone
+    std::vector<int> bearing_force;   // per mesh, −1: none
+    std::vector<int> external_force;  // per mass, −1: none
+    double drag_speed_limit = 0;      // of open clutches [rad/s]
+    double noteworthy_torque =
+        0;  // 1 % of the weakest clutch or brake, less is idling; 0: there is none [Nm]
     std::vector<double> root_inertia;  // √J
     // For the loops over all devices, so many zeros longer that whole registers can be read:
     std::vector<double> energy_factor;                   // by state: J/2, then k/2

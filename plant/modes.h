@@ -3,12 +3,15 @@
 //   ω̇ = B M̃,  B = Π₀ J⁻¹(I − Ĉ T̂),   M_R = T̂ M̃,   M̃ = S f − A_E (K φ + D A_Eᵀ ω)      [Algin] eq. (14), (15)
 //   ż = L q + S̃ f,  M_R = R_q q + R_f f
 //
+// with R the active rigid set (locked pairs, meshes, stuck meshes), C its kinematic and Ĉ its force columns, Π₀ the
+// projection onto the speeds that it allows, A_E the columns of shafts.
+//
 // The speeds that the rigid set leaves free, with the twists, are the coordinates q of the mode; z = E q. The
 // state stays z, of one layout in all modes; q is read out of it, and whatever comes from q lies on the constraints.
 //
-// with the active rigid set (locked pairs, meshes, stuck meshes), C its kinematic and Ĉ its force columns.
 // T̂ = G⁺ Qᵀ J^(−1/2), G = Qᵀ J^(−1/2) Ĉ, and Q an orthonormal basis of J^(−1/2) C: dependent rows (tie-up)
-// fall away by themselves; G⁺ is then the minimum-norm inverse weighted with the nominal capacities.
+// fall away by themselves; G⁺ is then the minimum-norm inverse weighted with the nominal capacities, of meshes
+// Structure::mesh_weight(), of losses at rest 1e-6 of that.
 #pragma once
 
 #include <cstdint>

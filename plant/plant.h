@@ -40,22 +40,29 @@ class ModelError : public std::runtime_error {
 };
 
 enum class EventKind : std::uint8_t {
+    // Friction pairs: closed, opened, free → slipping, no longer pressed.
     lock,
     break_away,
     engage,
-    release,  // friction pairs: closed, opened, free→slipping, slipping→free
+    release,
+    // Gears and planetary rows: at rest under load, moving again, power turned round.
     mesh_sticks,
     mesh_releases,
-    drive_side,  // gears: at rest under load, moving again, power reversed
+    drive_side,
+    // Several: a torque split is not unique; more changes in a step than are located.
     tie_up,
-    fall_back,  // torque split not unique; more than K events in a step
+    fall_back,
+    // Engines: fallen below their stall speed, running again.
     engine_stalls,
     engine_starts,
+    // Facings of clutches, beyond their temperatures.
     facing_warning,
     facing_failure,
+    // Shafts with play.
     flank_closes,
-    flank_opens,  // shafts with play
-    untold,       // more changes in this step than it can tell
+    flank_opens,
+    // More changes in this step than it can tell.
+    untold,
 };
 
 // Why a state changed ([Algin] eq. (12), (13)).

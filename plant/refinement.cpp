@@ -55,7 +55,8 @@ bool friction_outruns_stages(const Work& w, const Answer& answer) {
     for (int k = 0; k < m.pairs; ++k) {
         if (!slips(w.contact[k])) continue;
         // One that passes through no slip is past all that there is.
-        const double from = std::fabs(begin.slip[k]), to = std::fmax(0, slip_sign(w.contact[k]) * end.slip[k]);
+        const double from = std::fabs(begin.slip[k]),
+                     to = std::fmax(0, slip_sign(w.contact[k]) * end.slip[k]);
         const bool grows = to > growing * from, shrinks = from > growing * to;
         const FrictionLaw& law = m.pair_laws[static_cast<std::size_t>(k)].friction;
         const bool fades = law.factor_over_slip == nullptr && law.rise >= 0;
@@ -124,7 +125,8 @@ bool is_dense_coarse(Work& w, const Mode& mode) {
         }
         return moved;
     };
-    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || friction_outruns_stages(w, [&](int k) { return dense_answer(w, mode, k); }) || hides_swing(w);
+    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) ||
+           friction_outruns_stages(w, [&](int k) { return dense_answer(w, mode, k); }) || hides_swing(w);
 }
 
 // Along the tree shafts are not exact: the embedded method says how near they are. Where all stand still it says what rounding does.

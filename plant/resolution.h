@@ -6,7 +6,7 @@
 //   a force that answers the speed of its body     time of the answer < part     it overshoots, at a few parts without end
 //   friction on a body that swings on its shaft    ω part > 2 (ARK3: 0.3)        its reversals are missed
 //
-// The bounds are measured (docs/mechanics.md).
+// The bounds are measured (docs/mechanics.md, One step).
 #pragma once
 
 #include <string>

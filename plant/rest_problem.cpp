@@ -119,7 +119,7 @@ bool set_up(const Work& w, RestProblem& rest) {
             set_column(m, pair_links(w, k), pull, -1);
         } else {
             set_column(m, mesh_of(w, k - m.pairs).motion(), rest.motion + i * n);
-            set_column(m, loss_links(mesh_of(w, k - m.pairs)), pull, -1);
+            set_column(m, mesh_of(w, k - m.pairs).loss(), pull, -1);
         }
     }
     for (int k = 0; k < meshes; ++k) {
@@ -164,17 +164,14 @@ bool set_up(const Work& w, RestProblem& rest) {
     return true;
 }
 
-// How much each joint gives where loads are shared out: the less the larger its weight. Pairs weigh what they nominally hold,
-// each mesh `mesh_weight` times the heaviest of them.
+// How much each joint gives where loads are shared out: the less the larger its weight. Pairs weigh what they nominally hold.
 void set_gives(const ModelData& m, RestProblem& rest, double mesh_weight, double RestJoint::*give) {
-    double heaviest = 0, most = 0;
-    for (const FrictionPair& pair : m.structure.pairs) heaviest = std::max(heaviest, pair.nominal_capacity);
-    const double of_mesh = mesh_weight * (heaviest > 0 ? heaviest : 1);
+    double most = 0;
     for (int i = 0; i < rest.count; ++i) {
         RestJoint& joint = rest.joints[i];
         const double weight = joint.mesh < 0
                                   ? m.structure.pairs[static_cast<std::size_t>(joint.device)].nominal_capacity
-                                  : of_mesh;
+                                  : mesh_weight;
         joint.*give = 1 / (weight * joint.scale * joint.scale);
         most = std::max(most, joint.*give);
     }
@@ -182,10 +179,6 @@ void set_gives(const ModelData& m, RestProblem& rest, double mesh_weight, double
 }
 
 }  // namespace
-
-std::array<Link, 2> loss_links(const Mesh& mesh) SHIFTRIG_REALTIME {
-    return {Link{mesh.second, mesh.ratio}, Link{mesh.carrier, -mesh.ratio}};
-}
 
 bool is_still(const Work& w, const Mode& mode, int device, const Sample& s) SHIFTRIG_REALTIME {
     return mode.bound[device] != 0 ||
@@ -212,8 +205,8 @@ bool pose_rest_problem(Work& w, const Mode& mode, int around, Sample& s,
     free_torques(w, mode, s, rest.free);
     const bool posed = mode.tree ? set_up_trains(w, piece, rest) : set_up(w, rest);
     if (posed) {
-        set_gives(m, rest, 1e-3, &RestJoint::give);  // as in build_mode()
-        set_gives(m, rest, 1e3, &RestJoint::give_on_losses);
+        set_gives(m, rest, m.structure.loss_weight(), &RestJoint::give);
+        set_gives(m, rest, m.structure.mesh_weight(), &RestJoint::give_on_losses);
     }
     contact_forces(w, w.contact, s);
     return posed;

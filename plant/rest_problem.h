@@ -84,9 +84,6 @@ bool pose_rest_problem(Work& work, const Mode& mode, int around, Sample& sample,
 // cannot move.
 bool set_up_trains(const Work& work, const Piece& piece, RestProblem& rest) SHIFTRIG_REALTIME;
 
-// How the loss of a mesh acts on its masses.
-std::array<Link, 2> loss_links(const Mesh& mesh) SHIFTRIG_REALTIME;
-
 // How a load is split where mechanics leaves that open.
 enum class Split {
     any,  // a corner of what is possible, which one depends on signs and order: for accelerations, which are unique

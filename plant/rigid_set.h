@@ -11,11 +11,10 @@
 
 namespace shiftrig::plant {
 
-// Gears and planetary rows always belong to it, closed clutches, brakes and freewheels as named. Wheel contacts count as
-// closed and tyres as rolling without slip where `rolling` is asked for; shafts count as untwistable where `stiff` is.
+// Gears and planetary rows always belong to it, closed clutches, brakes and freewheels as named.
 struct RigidOptions {
-    bool stiff_shafts = true;
-    bool rolling_tyres = true;
+    bool stiff_shafts = true;   // shafts are untwistable, with the play of backlashes taken up
+    bool rolling_tyres = true;  // tyres roll without slip, and wheel contacts are closed
 };
 
 struct RigidSet {

@@ -1,5 +1,6 @@
 // The quantities of one instant inside a step, and the working memory that holds the few instants a step
-// looks at. Internal to plant/; nothing here survives a step.
+// looks at. Internal to plant/. Nothing of Scratch survives a step; the two samples that a step begins and ends with lie
+// in OperatorsData (modes.h), where the next step may begin with the last.
 #pragma once
 
 #include <vector>

@@ -25,9 +25,8 @@ Use most_used(const Work& work, const unsigned char* contact, const Sample& samp
 // release_drive() finds out.
 void open_pair(Work& work, const Mode& mode, int pair, Sample& sample) SHIFTRIG_REALTIME;
 
-// A lossy mesh that others hold at rest takes any loss torque up to the limit of either direction: the machine stands as
-// long as some split of the torques is within everybody's limits. So before a pair opens, the mesh that relieves
-// the most used pair most is set to its limit. Says whether one was.
+// A lossy mesh that others hold at rest takes any loss torque up to the limit of either direction. So before a pair opens, the
+// mesh that relieves the most used pair most is set to its limit. Says whether one was; else rearrange() asks all at rest.
 bool lean_on_losses(Work& work, const Mode& mode, const Use& most, Sample& sample) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

@@ -5,7 +5,7 @@
 //   φ                     twists of the shafts                [rad]
 //   distance              of translating masses               [m]
 //   auxiliary             κ per tyre [1]; torque [Nm] and boost [1] per engine
-//   contact               one byte per pair and mesh (contact.h)
+//   contact               one byte per pair, mesh and shaft with play (contact.h)
 //   actuators             per clutch as its actuation needs
 //   heat                  per friction pair, since start      [J]
 //   temperature           surfaces of heated clutches, then their bulks, in whole panels (kernels.h) each   [°C]

@@ -174,13 +174,12 @@ void StaticsSolver::solve_torques() {
     }
 
     // Minimum norm weighted by capacity: only where a tie-up leaves the split open does the weight matter.
-    Eigen::VectorXd weight = Eigen::VectorXd::Constant(unknowns, 1e4);
-    double largest = 1;
-    for (const FrictionPair& pair : structure_.pairs) largest = std::max(largest, pair.nominal_capacity);
+    const double of_mesh = structure_.mesh_weight();  // as modes share
+    Eigen::VectorXd weight = Eigen::VectorXd::Ones(unknowns);
     for (Eigen::Index k = 0; k < devices; ++k) {
         const auto& member = set_.members[static_cast<std::size_t>(k)];
         if (member.kind != RigidSet::Kind::pair) continue;
-        weight[k] = structure_.pairs[static_cast<std::size_t>(member.index)].nominal_capacity / largest;
+        weight[k] = structure_.pairs[static_cast<std::size_t>(member.index)].nominal_capacity / of_mesh;
     }
     const Eigen::VectorXd root = weight.cwiseSqrt();
     const Eigen::VectorXd row =
@@ -222,10 +221,8 @@ int StaticsSolver::wanted_direction(std::size_t m) const {
     const Mesh& mesh = structure_.meshes[m];
     const double relative = meshing_speed(mesh);
     if (!mesh.lossy() || relative == 0) return 0;
-    const double slope = mesh.forward_efficiency - 1 / mesh.backward_efficiency;
-    const double kink = slope < 0 ? (mesh.forward_bearing - mesh.backward_bearing) / slope : 0;
     const double torque = torque_[static_cast<Eigen::Index>(m)] * (relative > 0 ? 1 : -1);
-    return torque >= kink ? 1 : -1;
+    return torque >= mesh.loss_kink() ? 1 : -1;
 }
 
 void StaticsSolver::settle_directions() {

@@ -93,6 +93,11 @@ Structure Assembly::finish() {
     }
     std::stable_sort(structure.pairs.begin(), structure.pairs.end(),
                      [](const FrictionPair& a, const FrictionPair& b) { return a.kind < b.kind; });
+    // Whichever order connectors came in: a shaft with play has a contact byte behind, rows are shown as the last meshes.
+    std::stable_partition(structure.shafts.begin(), structure.shafts.end(),
+                          [](const Elastic& shaft) { return shaft.gap == 0; });
+    std::stable_partition(structure.meshes.begin(), structure.meshes.end(),
+                          [](const Mesh& mesh) { return !mesh.planetary; });
     return std::move(structure);
 }
 

@@ -19,6 +19,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <span>
 #include <string>
@@ -79,6 +80,14 @@ struct Mesh {
     std::array<Link, 2> motion() const noexcept {
         return {Link{first, 1}, Link{carrier, carrier < 0 ? 0. : -1.}};
     }
+    // How a loss torque, referred to the first link, acts on the masses.
+    std::array<Link, 2> loss() const noexcept { return {Link{second, ratio}, Link{carrier, -ratio}}; }
+    // M_1, moving forward, at which the loss lines of both directions cross: the first link drives above it. Lines that are
+    // parallel do not: bearing friction alone is overcome by either link, half of it by each at this torque. [Nm]
+    double loss_kink() const noexcept {
+        const double slope = forward_efficiency - 1 / backward_efficiency;
+        return slope < 0 ? (forward_bearing - backward_bearing) / slope : forward_bearing / 2;
+    }
 };
 
 // A shaft or a damper: a known torque stiffness·twist + damping·(ω_a − ω_b). With a gap, only beyond it.
@@ -100,12 +109,22 @@ struct Structure {
     std::vector<std::string> mass_names;
     std::vector<double> inertia;  // [kg m²] or [kg]
     std::vector<FrictionPair> pairs;
-    std::vector<Mesh> meshes;     // gears, then planetary rows, in description order
-    std::vector<Elastic> shafts;  // then backlashes
+    std::vector<Mesh> meshes;     // gears and their like, then planetary rows, in description order
+    std::vector<Elastic> shafts;  // without play, then those with it, in description order
     std::vector<Elastic> dampers;
     std::vector<RollingContact> rolling_contacts;  // of tyres whose law is a force
 
     int masses() const noexcept { return static_cast<int>(inertia.size()); }
+    // Where closed loops leave torques open they are shared by minimum norm, each weighted: a pair by its nominal capacity, a
+    // mesh by this, since sharing is for friction pairs [Nm].
+    double mesh_weight() const noexcept {
+        double heaviest = 0;
+        for (const FrictionPair& pair : pairs) heaviest = std::max(heaviest, pair.nominal_capacity);
+        return 1e3 * (heaviest > 0 ? heaviest : 1);
+    }
+    double loss_weight() const noexcept {
+        return 1e-6 * mesh_weight();
+    }                                                // of the loss torque of a mesh at rest
     int mass(std::string_view name) const noexcept;  // index, or −1
     int pair(std::string_view name) const noexcept;  // index, or −1
     int mesh(std::string_view name) const noexcept;  // index, or −1

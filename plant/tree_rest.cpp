@@ -71,7 +71,7 @@ bool set_up_trains(const Work& w, const Piece& piece, RestProblem& rest) SHIFTRI
         if (c > 0) {
             const RestJoint& joint = rest.joints[c - 1];
             for (const Link& link :
-                 joint.mesh < 0 ? pair_links(w, joint.device) : loss_links(mesh_of(w, joint.mesh))) {
+                 joint.mesh < 0 ? pair_links(w, joint.device) : mesh_of(w, joint.mesh).loss()) {
                 if (link.mass >= 0) t.load[position_of(m, link.mass)] -= link.factor;
             }
         }

@@ -210,7 +210,8 @@ class Builder {
 
 std::unique_ptr<TreeTopology> build_topology(const ModelData& model, std::string& reason) {
     if (!model.backlashes.empty()) {
-        reason = "backlash \"" + model.description.backlashes.front().name + "\" changes its stiffness";
+        const auto shaft = static_cast<std::size_t>(model.backlashes.front().shaft);
+        reason = "backlash \"" + model.structure.shafts[shaft].name + "\" changes its stiffness";
         return nullptr;
     }
     Builder builder(model);

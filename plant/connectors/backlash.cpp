@@ -29,9 +29,10 @@ void name_outputs(detail::ModelBuilder& builder, const std::vector<Backlash>& ba
     }
 }
 
-double* show(const detail::Shown& at, const std::vector<Backlash>&, double* next) SHIFTRIG_REALTIME {
+double* show(const detail::Shown& at, const std::vector<Backlash>& devices, double* next) SHIFTRIG_REALTIME {
     const detail::ModelData& m = at.model();
-    for (const BacklashLaw& law : m.backlashes) {
+    for (std::size_t i = 0; i < devices.size(); ++i) {  // they are the first shafts with play
+        const BacklashLaw& law = m.backlashes[i];
         const double side = detail::flank_side(at.work.contact[law.device]);
         const double twist = at.sample.z[m.masses + law.shaft];
         *next++ = side == 0 ? 0. : flank_torque(law, side, twist, at.sample.swing[law.shaft]);

@@ -17,10 +17,9 @@ namespace {
 double nominal_capacity(const Clutch& clutch) {
     if (const auto* dry = std::get_if<DryFriction>(&clutch.friction)) return dry->sliding_capacity;
     const auto& wet = std::get<WetPlates>(clutch.friction);
-    const auto* hydraulic = std::get_if<ActuationHydraulic>(&clutch.actuation);
-    const double pressure = hydraulic ? hydraulic->maximum_pressure : 2 * wet.return_pressure + 1e5;
     const FrictionLaw law = friction_law(wet);
-    return static_capacity(law, load_from_pressure(law, pressure));
+    const auto& hydraulic = std::get<ActuationHydraulic>(clutch.actuation);  // check_parameters() saw to that
+    return static_capacity(law, load_from_pressure(law, hydraulic.maximum_pressure));
 }
 
 // Current that the characteristic turns into this pressure.
@@ -103,8 +102,8 @@ void check_parameters(const Check& check, const Clutch& c) {
             check.fail("preload_pressure",
                        "= " + number(h->preload_pressure) + "; must be <= return_pressure");
         if (wet && !(h->maximum_pressure > wet->return_pressure))
-            check.fail("maximum_pressure",
-                       "= " + number(h->maximum_pressure) + "; must be > return_pressure, which it works against");
+            check.fail("maximum_pressure", "= " + number(h->maximum_pressure) +
+                                               "; must be > return_pressure, which it works against");
         if (h->solenoid) {
             check.rising("solenoid", h->solenoid->pressure_over_current);
             check.not_negative("hysteresis", h->solenoid->hysteresis);
@@ -145,12 +144,12 @@ void check_surroundings(const Description& machine, const Clutch& c) {
 
 void assemble(Assembly& assembly, const Clutch& c) {
     const double b = c.radius > 0 ? -1 / c.radius : -1;
-    assembly.structure.pairs.push_back({c.name,
-                                        PairKind::clutch,
-                                        {assembly.link(c.a, 1), assembly.link(c.b, b)},
-                                        nominal_capacity(c),
-                                        c.radius > 0,
-                                        c.initially_locked});
+    assembly.structure.pairs.push_back({.name = c.name,
+                                        .kind = PairKind::clutch,
+                                        .links = {assembly.link(c.a, 1), assembly.link(c.b, b)},
+                                        .nominal_capacity = nominal_capacity(c),
+                                        .rolling_contact = c.radius > 0,
+                                        .initially_locked = c.initially_locked});
 }
 
 namespace {

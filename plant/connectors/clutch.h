@@ -1,5 +1,5 @@
 // Clutch, brake or Coulomb wheel contact: a friction pair, what presses it together, and its heat. Laws: laws/friction.h,
-// hydraulics.h, lag.h, heat.h, oil.h, wheel_contact.h.
+// hydraulics.h, lag.h, heat.h, oil.h.
 #pragma once
 
 #include <array>
@@ -105,14 +105,15 @@ struct FacingHeat {
     double fail_temperature = 0;  // [°C]
 };
 
-// Friction clutch between a and b; with b empty a brake. b_per_a generalises the pair to a wheel on a
-// road ([Algin] Fw): Δ = ω_a − v_b/radius, SDM column (1, −1/radius); radius 0 means a plain clutch.
+// Friction clutch between a and b; with b empty a brake. A radius generalises the pair to the rim of a wheel on a
+// road ([Algin] Fig. 11, Fw): Δ = ω_a − v_b/radius, positive where the rim runs ahead, SDM column (1, −1/radius),
+// sliding_capacity = μ · weight · radius. It knows no tyre elasticity, soil (tyre.h does) or side force.
 struct Clutch {
     std::string name, a, b;
     Friction friction;
     Actuation actuation;
     std::optional<FacingHeat> heat;
-    double radius = 0;  // [m], wheel contact only
+    double radius = 0;  // [m], wheel contact only; 0: a plain clutch or brake
     bool initially_locked = false;
     bool drag = false;  // viscous drag of the open wet clutch, by oil viscosity
 };

@@ -1,7 +1,8 @@
 // What every kind of connector is asked. A kind has one header and one source in this folder: its parameters (what a
 // Description holds of it), its law where that is its own, and its answers, as overloads of the functions below. The list
 // of kinds stands in plant/connectors.h; whoever needs something of all of them goes through it and asks, so that validation,
-// structure, model, outputs, events and statics know none of them by name.
+// structure, model, outputs, events and statics know none of them by name. What `check` says beside that does:
+// resolution.cpp, modal.cpp, warnings.cpp.
 //
 // No answer is virtual, and nothing is looked up at run time: which one is meant is settled when the program is compiled.
 #pragma once

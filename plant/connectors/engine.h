@@ -10,7 +10,8 @@
 
 namespace shiftrig::plant {
 
-// Diesel engine on a mass; the net torque of rulings in docs/mechanics.md.
+// Diesel engine on a mass. full_load is net, as a brake on the crankshaft measures it. Figures of the reference tractor with
+// their sources: config/tractor.yaml.
 struct Engine {
     std::string name, mass;
     std::vector<std::pair<double, double>> full_load;      // (ω [rad/s], T [Nm]), rising in ω

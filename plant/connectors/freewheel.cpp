@@ -15,8 +15,10 @@ void check_parameters(const Check& check, const Freewheel& f) {
 }
 
 void assemble(Assembly& assembly, const Freewheel& f) {
-    assembly.structure.pairs.push_back(
-        {f.name, PairKind::self_acting, assembly.between(f.a, f.b), f.rated_torque});
+    assembly.structure.pairs.push_back({.name = f.name,
+                                        .kind = PairKind::self_acting,
+                                        .links = assembly.between(f.a, f.b),
+                                        .nominal_capacity = f.rated_torque});
 }
 
 void add_pair_law(detail::ModelBuilder& builder, const Freewheel& f) {

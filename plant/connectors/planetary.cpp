@@ -24,7 +24,8 @@ void name_outputs(detail::ModelBuilder& builder, const std::vector<Planetary>& r
         const std::string prefix = "row." + row.name + ".";
         builder.output(prefix + "sun", builder.effort_unit(row.sun), "torque from the sun into the row");
         builder.output(prefix + "ring", builder.effort_unit(row.ring), "torque from the ring into the row");
-        builder.output(prefix + "carrier", builder.effort_unit(row.carrier), "torque from the carrier into the row");
+        builder.output(prefix + "carrier", builder.effort_unit(row.carrier),
+                       "torque from the carrier into the row");
         builder.output(prefix + "direction", Unit::one, "x: +1 the sun drives, -1 it is driven, 0 at rest");
     }
 }

@@ -21,7 +21,8 @@ void assemble(Assembly& assembly, const Shaft& s) {
 // One quantity of all shafts after the other: loops write them so.
 void name_outputs(detail::ModelBuilder& builder, const std::vector<Shaft>& shafts) {
     for (const Shaft& shaft : shafts)
-        builder.output("shaft." + shaft.name + ".torque", builder.effort_unit(shaft.a), "torque on the first link");
+        builder.output("shaft." + shaft.name + ".torque", builder.effort_unit(shaft.a),
+                       "torque on the first link");
     for (const Shaft& shaft : shafts) {
         builder.output("shaft." + shaft.name + ".twist", builder.way_unit(shaft.a),
                        "twist, positive where the first link is ahead");

@@ -1,4 +1,17 @@
 // Elastic shaft with a damper beside it, between two masses or from one to the housing.
+//
+//     M = k φ + d φ̇,   φ̇ = ω_a − ω_b                 column (a: 1, b: −1)
+//     stored ½ k φ², dissipated d φ̇²
+//
+//   M     torque on the first link, from a into the shaft       Nm (N between bodies that move straight on)
+//   φ     twist (state)                                         rad (m), positive where a is ahead of b
+//   k     stiffness                                             Nm/rad, > 0
+//   d     damping                                               Nm s/rad, ≥ 0
+//
+// Linear, so it is part of L of the mode and no stiffness limits the step.
+// Source: [Algin] eq. (14).
+// Does not model: its own inertia (share it between the masses), stiffness that changes with the twist, hysteresis; play is
+// backlash.h.
 #pragma once
 
 #include <array>
@@ -9,11 +22,10 @@
 
 namespace shiftrig::plant {
 
-// Elastic shaft with its parallel damper, [Algin] eq. (14): M = stiffness·twist + damping·(ω_a − ω_b).
 struct Shaft {
     std::string name, a, b;    // b empty: to the housing
-    double stiffness = 0;      // [Nm/rad]
-    double damping = 0;        // [Nm s/rad]
+    double stiffness = 0;      // [Nm/rad], > 0
+    double damping = 0;        // [Nm s/rad], ≥ 0
     double initial_twist = 0;  // [rad], positive where a is ahead of b
 };
 

@@ -16,8 +16,8 @@ void add_law(detail::ModelBuilder& builder, const TorqueSource& source) {
     law.mass = m.structure.mass(source.mass);
     law.force = builder.external(law.mass);
     if (source.input)
-        law.input = builder.input("source." + source.name + ".torque", builder.effort_unit(source.mass), 0, -1e9, 1e9,
-                                  "test-bench torque");
+        law.input = builder.input("source." + source.name + ".torque", builder.effort_unit(source.mass), 0,
+                                  -1e9, 1e9, "test-bench torque");
     builder.breakpoints(source.waveform);
     if (!source.waveform.pieces.empty()) m.depends_on_time = true;
     m.sources.push_back(law);

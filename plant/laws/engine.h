@@ -20,7 +20,7 @@
 // friction becomes a friction device on the crankshaft (capacity T_friction), so that it resists either
 // way and holds at rest. A start event cranks it with half of the torque at fade_from [estimate] up to
 // fade_from (and stall_speed), or for at most 3 s.
-// Source: usual mean-value model; parameters of the reference tractor in docs/mechanics.md.
+// Source: usual mean-value model; parameters of the reference tractor in config/tractor.yaml.
 // Does not model: cylinder-by-cylinder torque, smoke limit beyond φ, engine brake, temperature.
 #pragma once
 

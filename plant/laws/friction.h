@@ -16,7 +16,7 @@
 //   v       |Δω| r_m, sliding speed               m/s
 //   z       number of friction surfaces           1
 //
-// Source: [Algin] eq. (11)–(13); μ(v) as in the parameters of the reference tractor (docs/mechanics.md).
+// Source: [Algin] eq. (11)–(13); μ(v) as a fade from rest; figures in config/tractor.yaml.
 // Does not model: growth of the static capacity with time closed, fading with temperature, wear, judder from
 // the geometry of the plates.
 #pragma once
@@ -35,7 +35,7 @@ struct FrictionLaw {
     double rise = 0;           // [1]
     double inverse_speed = 0;  // 1/fade_speed [s/rad]
     double static_factor = 0;  // [1]
-    // load = load_per_engagement · engagement, or load_per_pascal · max(0, p − return_pressure)
+    // dry: load = load_per_engagement · engagement, wet: load_per_pascal · max(0, p − return_pressure)
     double load_per_engagement = 0;  // [Nm]
     double load_per_pascal = 0;      // [Nm/Pa]
     double return_pressure = 0;      // [Pa]
@@ -62,9 +62,7 @@ inline FrictionLaw friction_law(const DryFriction& p) noexcept {
     return law;
 }
 
-// `full_pressure` is the pressure that an engagement of 1 stands for where the wet clutch is actuated by a
-// factor instead of a pressure; 0 where it is actuated hydraulically.
-inline FrictionLaw friction_law(const WetPlates& p, double full_pressure = 0) noexcept {
+inline FrictionLaw friction_law(const WetPlates& p) noexcept {
     const double radius = mean_radius(p);
     FrictionLaw law;
     law.base = p.mu_sliding;
@@ -73,8 +71,6 @@ inline FrictionLaw friction_law(const WetPlates& p, double full_pressure = 0) no
     law.static_factor = p.mu_static;
     law.load_per_pascal = p.piston_area * radius * p.surfaces;
     law.return_pressure = p.return_pressure;
-    law.load_per_engagement =
-        law.load_per_pascal * (full_pressure > p.return_pressure ? full_pressure - p.return_pressure : 0);
     return law;
 }
 

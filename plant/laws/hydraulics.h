@@ -21,7 +21,7 @@
 // at the middle and the end of the step, whatever h. The chamber pressure jumps where the piston arrives at
 // full stroke with p > p_return; HydraulicStep says when, so that the engine can split its step there. All
 // else is continuous, p with two derivatives.
-// Source: usual electro-hydraulic clutch model; figures are estimates (docs/mechanics.md).
+// Source: usual electro-hydraulic clutch model; figures are estimates (config/tractor.yaml).
 // Does not model: flow forces, leakage, compressibility, a different emptying; p may swing below 0: harmless suction.
 #pragma once
 

@@ -12,7 +12,7 @@
 //   h     clearance per surface when open   m
 //   Δω    slip of the open clutch           rad/s; T acts on the first link with its sign
 //
-// Source: laminar shear of a full gap (Newton); temperatures and factors are estimates (docs/mechanics.md).
+// Source: laminar shear of a full gap (Newton); temperatures and factors are estimates (config/tractor.yaml).
 // Does not model: aeration and emptying of the gap beyond its limit speed, oil flow, heating of the oil.
 #pragma once
 

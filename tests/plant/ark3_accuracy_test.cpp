@@ -4,6 +4,7 @@
 
 #include "rig.h"
 #include "tests/plant/ark3_chain.h"
+#include "tests/plant/machines.h"
 #include "tests/plant/random_forests.h"
 
 namespace shiftrig::plant {
@@ -120,6 +121,51 @@ double worst_of_long_steps(Description d, double h, int parts) {
     double worst = 0;
     for (std::size_t j = 0; j < n; ++j) worst = std::max(worst, difference[j] / range[j]);
     return worst;
+}
+
+// A clutch that slips with fading friction, a shaft under strain behind it, a drag on the last mass: smooth for 0.4 s.
+Rig slipping_on_a_shaft(double stiffness, Method method, double h) {
+    Description d;
+    d.masses = {machines::mass("a", 0.5), machines::mass("b", 1), machines::mass("c", 1.5)};
+    d.masses[0].initial_speed = 100;
+    d.masses[1].initial_speed = d.masses[2].initial_speed = 20;
+    d.shafts = {machines::shaft("shaft", "b", "c", stiffness, 0.2)};
+    d.shafts[0].initial_twist = 0.01;
+    d.clutches = {machines::clutch("clutch", "a", "b")};
+    DryFriction fading = machines::dry(30, 1.5);
+    fading.falling = 0.4;
+    fading.falling_speed = 20;
+    d.clutches[0].friction = fading;
+    TorqueSource drag;
+    drag.name = "drag";
+    drag.mass = "c";
+    drag.quadratic = 1e-2;
+    d.sources = {drag};
+    d.method = method;
+    d.maximum_parts = 1;
+    Rig rig(d, {h, KernelKind::portable});
+    rig.run(0.4);
+    return rig;
+}
+
+TEST(Ark3, AccountClosesAtTheOrderOfTheStep) {
+    const auto order = [](Method method, double h) {
+        const auto defect = [&](double step) {
+            return slipping_on_a_shaft(2000, method, step).out("energy.defect");
+        };
+        return std::log2(defect(h) / defect(h / 2));
+    };
+    EXPECT_NEAR(order(Method::ark3, 1e-3), 3, 0.05);
+    EXPECT_NEAR(order(Method::ark3, 5e-4), 3, 0.05);
+    EXPECT_NEAR(order(Method::etd3, 4e-3), 4, 0.05) << "what is booked there is what the step did";
+}
+
+// ½ k φ² = 10 J and 1000 J in the shaft at the start; its own damper takes an eighth of it in that time, the step
+// what it does not see.
+TEST(Ark3, AccountMissesTheSwingsThatTheStepDamps) {
+    EXPECT_NEAR(slipping_on_a_shaft(2e5, Method::ark3, 1e-3).out("energy.defect"), -3.23, 0.01);
+    EXPECT_LT(std::fabs(slipping_on_a_shaft(2e5, Method::etd3, 1e-3).out("energy.defect")), 1e-4);
+    EXPECT_NEAR(slipping_on_a_shaft(2e7, Method::ark3, 2.5e-4).out("energy.defect"), -1000, 2);
 }
 
 // Shafts of the forests swing by up to 3 rad in 10 ms: a step of that length sees nothing of it, its parts do.

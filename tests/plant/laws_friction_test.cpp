@@ -10,7 +10,6 @@
 #include "plant/laws/road.h"
 #include "plant/laws/tyre.h"
 #include "plant/laws/waveform.h"
-#include "plant/laws/wheel_contact.h"
 #include "plant/plant.h"
 #include "tests/plant/parts.h"
 
@@ -155,12 +154,6 @@ TEST(Road, GradeIsATangentAndAirOpposesMotion) {
     EXPECT_NEAR(grade_force(road, 0.15, 9.80665), -14000 * 9.80665 * std::sin(std::atan(0.15)), 1e-9);
     EXPECT_EQ(grade_force(road, -0.1, 9.8), -grade_force(road, 0.1, 9.8));
     EXPECT_NEAR(air_force(road, -10), 282, 1e-12);
-}
-
-TEST(WheelContact, SlipAndCapacityAtTheRim) {
-    EXPECT_NEAR(wheel_slip_speed(10, 9.35, 0.935), 0, 1e-14);
-    EXPECT_GT(wheel_slip_speed(11, 9.35, 0.935), 0);
-    EXPECT_NEAR(wheel_capacity(0.5, 1000, 0.9), 450, 1e-12);
 }
 
 TorqueConverter reference_converter() {

@@ -67,7 +67,7 @@ inline Shaft shaft(std::string name, std::string a, std::string b, double stiffn
     return s;
 }
 
-// The WT gearbox of [Algin] Fig. 9 (the layout of docs/mechanics.md): three rows, clutches C1, C2, brakes C3…C5.
+// The WT gearbox of [Algin] Fig. 9 (config/wt_gearbox.yaml): three rows, clutches C1, C2, brakes C3…C5.
 inline Description wt_gearbox() {
     Description d;
     d.name = "wt_gearbox";
