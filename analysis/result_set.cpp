@@ -29,6 +29,20 @@ std::string run_name(const fs::path& path) {
     return file;
 }
 
+// Of half a run, half of what happened is told: what went missing with the rest would pass for better.
+constexpr const char* only_whole = "; only whole runs are compared";
+
+// A result says itself whether its run came to its end and could be judged (`run --json`, `test --json`).
+void require_whole(const json& result, const std::string& where) {
+    if (const auto loop = result.find("loop"); loop != result.end() && loop->is_object()) {
+        const std::string outcome = loop->value("outcome", json("completed")).dump();
+        if (outcome != "\"completed\"")
+            throw io::InputError(where + " did not come to its end (outcome " + outcome + ")" + only_whole);
+    }
+    if (const auto error = result.find("error"); error != result.end() && error->is_string())
+        throw io::InputError(where + " could not be judged: " + error->get<std::string>());
+}
+
 // Somebody else may have written them: what is compared is held against its kind here.
 void check_shift(const json& shift, const std::string& where) {
     const auto refuse = [&](const std::string& key, const json& value, const char* rule) {
@@ -63,8 +77,9 @@ class ResultSet {
         if (io::looks_like_recording(path.string())) {
             const plant::Description machine =
                 io::recorded_model_file(io::RecordingReader(path.string()).manifest()).description;
-            add(run_name(path), to_json(score(load_run(path.string(), scorecard_signals(machine)), limits_)),
-                path.string());
+            const Run run = load_run(path.string(), scorecard_signals(machine));
+            if (const auto why = run.incomplete(); !why.empty()) throw io::InputError(why + only_whole);
+            add(run_name(path), to_json(score(run, limits_)), path.string());
             return;
         }
         std::ifstream file(path);
@@ -87,6 +102,7 @@ class ResultSet {
                 if (document.contains(key) && document[key].is_string())
                     own = run_name(document[key].get<std::string>());
             }
+            require_whole(document, path + ": run \"" + own + "\"");
             add(own, document["shifts"], path);
         } else if (document.is_object() && document.contains("runs")) {
             take(document["runs"], name, path);
