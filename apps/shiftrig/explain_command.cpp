@@ -47,12 +47,10 @@ int run(const Options& options) {
         }
     }
     if (options.json) std::cout << list.dump(2) << '\n';
-    for (const auto& [what, text] : recorded.identity)
-        if (what == "incomplete") {
-            std::cerr << text << '\n';
-            return bad_input;
-        }
-    return good;
+    const std::string incomplete = recorded.incomplete();
+    if (incomplete.empty()) return good;
+    std::cerr << incomplete << '\n';
+    return bad_input;
 }
 
 Command::Run declare(CLI::App& app) {

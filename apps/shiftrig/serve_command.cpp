@@ -55,7 +55,9 @@ int run(const Options& options) {
 
     rig::Choices choices = options.choices;
     choices.lockstep = options.pacing() == rt::Pace::lockstep;
-    rig::Rig rig(rig::make_setup(choices));
+    rig::Setup setup = rig::make_setup(choices);
+    options.check_files(setup);
+    rig::Rig rig(std::move(setup));
     for (const auto& warning : rig.buses().warnings()) std::cerr << warning << '\n';
     pthread_sigmask(SIG_UNBLOCK, &ends, nullptr);  // nothing is lost yet: either signal may end it as usual
     rehearse(options, rig);
@@ -99,11 +101,14 @@ Command::Run declare(CLI::App& app) {
         ->capture_default_str();
     add_number(app, "--port", options->http.port, {0, 65535}, "0: any free one")->capture_default_str();
     app.add_option("--token", options->http.token, "that every request must carry (?token=…)");
-    app.add_option(
+    options->files.written(app.add_option(
         "--record", options->record,
         "record from the start, to this file; after a change from the page the next ones go to FILE-2, "
-        "FILE-3, …");
-    return [options] { return run(*options); };
+        "FILE-3, …"));
+    return [options] {
+        options->files.check();
+        return run(*options);
+    };
 }
 
 const Command command("serve", "the rig with its live dashboard on 127.0.0.1", declare);
