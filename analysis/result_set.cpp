@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -11,6 +10,7 @@
 #include "io/input_error.h"
 #include "io/recording/reader.h"
 #include "io/recording/rebuild.h"
+#include "io/text_file.h"
 
 namespace shiftrig::analysis {
 
@@ -82,8 +82,7 @@ class ResultSet {
             add(run_name(path), to_json(score(run, limits_)), path.string());
             return;
         }
-        std::ifstream file(path);
-        const json document = json::parse(file, nullptr, false);
+        const json document = json::parse(io::read_text(path.string()), nullptr, false);
         if (document.is_discarded()) throw io::InputError(path.string() + ": neither a recording nor JSON");
         take(document, run_name(path), path.string());
     }
