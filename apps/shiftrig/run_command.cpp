@@ -13,6 +13,7 @@
 #include <memory>
 #include <thread>
 
+#include "analysis/change_json.h"
 #include "analysis/scorecard.h"
 #include "apps/rig/session.h"
 #include "apps/rig/snapshot.h"
@@ -20,12 +21,12 @@
 #include "apps/shiftrig/certificate_report.h"
 #include "apps/shiftrig/child.h"
 #include "apps/shiftrig/command.h"
+#include "apps/shiftrig/ending_signals.h"
 #include "apps/shiftrig/live_line.h"
 #include "apps/shiftrig/loop_report.h"
 #include "apps/shiftrig/resumed_rig.h"
 #include "apps/shiftrig/rig_options.h"
 #include "io/recording/csv.h"
-#include "io/recording/event_json.h"
 #include "io/recording/reader.h"
 #include "plant/warnings.h"
 #include "rt/machine.h"
@@ -75,7 +76,6 @@ void check_snapshot_time(double at_s, const rig::Rig& rig, std::int64_t slots) {
     if (at > rig.ticks() + slots) refuse("ends at", rig.ticks() + slots);
 }
 
-// SIGINT and SIGTERM end the run as if its time were over.
 std::atomic<rt::LoopControl*> running{nullptr};
 
 void on_signal(int) {
@@ -88,19 +88,22 @@ class SignalsStop {
         running = &control;
         struct sigaction action = {};
         action.sa_handler = on_signal;
-        sigaction(SIGINT, &action, nullptr);
-        sigaction(SIGTERM, &action, nullptr);
+        for (const int signal : ending_signals()) sigaction(signal, &action, nullptr);
     }
     ~SignalsStop() { running = nullptr; }
 };
 
-// Gives the controller its time, unless the run is over before it began.
-void get_ready(const RunOptions& options, const rt::LoopControl& control) {
+// Gives the controller its time, unless the run is over before it began. False if it turns out to be no program.
+bool get_ready(const RunOptions& options, const rt::LoopControl& control, Child& controller) {
     using Clock = std::chrono::steady_clock;
     const auto begin = Clock::now() + std::chrono::duration<double>(options.controller_start_s);
-    while (Clock::now() < begin && !control.stopping())
+    while (Clock::now() < begin && !control.stopping()) {
         std::this_thread::sleep_for(
             std::min<std::chrono::duration<double>>(begin - Clock::now(), std::chrono::milliseconds(20)));
+        if (const auto how = controller.ended()) std::cerr << *how << '\n';
+        if (controller.was_no_program()) return false;
+    }
+    return true;
 }
 
 // What the session needs beside the rig, and what is left of it afterwards.
@@ -128,14 +131,6 @@ Beside prepare(const RunOptions& options, const rig::Rig& rig, const rt::LoopSet
     return beside;
 }
 
-nlohmann::json event_json(const analysis::Change& change) {
-    nlohmann::json event = {{"time_s", change.event.time}};
-    if (!change.device.empty()) event = io::event_json(change.event, change.device, change.members);
-    event["kind"] = change.kind;
-    event["text"] = change.text;
-    return event;
-}
-
 nlohmann::json result_json(const rig::Rig& rig, const rt::LoopReport& report, const analysis::Run& run,
                            const analysis::Scorecard& scorecard) {
     const double wall = static_cast<double>(report.ended - report.began) * 1e-9;
@@ -146,7 +141,7 @@ nlohmann::json result_json(const rig::Rig& rig, const rt::LoopReport& report, co
     result["real_time_factor"] = wall > 0 ? rig.sim_time() / wall : 0;
     result["shifts"] = analysis::to_json(scorecard);
     result["events"] = nlohmann::json::array();
-    for (const auto& change : run.changes) result["events"].push_back(event_json(change));
+    for (const auto& change : run.changes) result["events"].push_back(analysis::to_json(change));
     result["final"] = nlohmann::json::object();
     for (int i = 0; i < rig.signals().size(); ++i)
         result["final"][io::column_name(rig.signals().signal(i))] = rig.value(i);
@@ -296,14 +291,15 @@ int run(const RunOptions& options) {
         const SignalsStop signals_stop(session.control());
         if (const auto command = rig::controller_command(options.choices); !command.empty()) {
             controller.emplace(command);
-            get_ready(options, session.control());
+            if (!get_ready(options, session.control(), *controller)) return bad_input;
         }
         run_loop(session, options, live, controller ? &*controller : nullptr, unanswered);
     }
+    const bool controlled = !controller || !controller->was_no_program();
     controller.reset();
 
     const bool frames_logged = rig.buses().end_logs();
-    bool whole = finish(options, beside) && frames_logged;
+    bool whole = finish(options, beside) && frames_logged && controlled;
     for (const auto& refusal : refusals)
         std::cerr << "this machine does not grant " << rt::to_string(refusal) << '\n';
     for (const auto& line : rig.buses().summary()) std::cerr << line << '\n';

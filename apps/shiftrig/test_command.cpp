@@ -141,12 +141,14 @@ Outcome run_one(const Options& options, const analysis::Limits& limits, const Ca
         if (const auto command = rig::controller_command(options.choices); !command.empty())
             controller.emplace(command);
         session.run();
+        if (controller)
+            if (const auto how = controller->ended(); how && controller->was_no_program())
+                result.error = path + ": " + *how;
         result.sim_time_s = rig.sim_time();
         result.outcome = name(session.report().outcome);
         result.failures = broken_run(path, session);
-        if (const auto missing = left_out(collector); !missing.empty()) {
-            result.error = path + ": " + missing;
-        } else if (result.failures.empty()) {
+        if (const auto missing = left_out(collector); !missing.empty()) result.error = path + ": " + missing;
+        if (result.error.empty() && result.failures.empty()) {
             const analysis::Run run = collector.finish(rig);
             const analysis::Scorecard card = analysis::score(run, limits);
             result.failures = analysis::broken_expectations(scenario, run, card);
