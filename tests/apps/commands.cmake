@@ -21,6 +21,8 @@ gtest_discover_tests(article_test)
 # What the commands do with the files they are given, and with those that are not whole.
 add_test(NAME files_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/files_test.py $<TARGET_FILE:shiftrig> ${CMAKE_SOURCE_DIR}/config)
 
+add_test(NAME json_docs_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/json_docs_test.py $<TARGET_FILE:shiftrig> ${CMAKE_SOURCE_DIR})
+
 if(SHIFTRIG_BENCH)
   set(SOAK $<TARGET_FILE:shiftrig_soak>)
 endif()
