@@ -5,6 +5,7 @@
 
 #include "apps/rig/rehearsal.h"
 #include "apps/shiftrig/arguments.h"
+#include "io/can/mapping.h"
 
 namespace shiftrig::cli {
 
@@ -88,6 +89,11 @@ void RigOptions::check_files(const rig::Setup& setup) const {
     if (setup.scenario) read.push_back({"the scenario", setup.scenario->path});
     if (!setup.buses.calibration_path.empty())
         read.push_back({"the controller's calibration", setup.buses.calibration_path});
+    if (setup.model.can.IsDefined()) {
+        const io::can::Mapping mapping = io::can::parse_mapping(setup.model.can, setup.model.path);
+        read.push_back({"the CAN mapping", mapping.file});
+        read.push_back({"the mapping's DBC", mapping.database.file});
+    }
     files.check(read);
 }
 

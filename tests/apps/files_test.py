@@ -79,7 +79,13 @@ class Outputs(Commands):
     def test_what_a_scenario_and_a_controller_read_is_not_overwritten_either(self):
         shutil.copytree(CONFIG, self.path("config"))
         scenario, model, calibration = "config/scenarios/plough_upshift.yaml", "config/tractor.yaml", "config/calibration/bad.yaml"
+        snapshot = self.shiftrig("run", "--scenario", scenario, "--pace", "free", "--snapshot-at", "1", "s.snap")
+        self.assertEqual(snapshot.returncode, 0, snapshot.stderr)
+        self.assert_refused(f"--record {model}: is the file of the model, which it would overwrite",
+                            "run", "--from", "s.snap", "--record", model)
         for arguments, output, what in ((("run",), model, "the model"), (("serve",), model, "the model"),
+                                        (("run",), "config/can/tractor.yaml", "the CAN mapping"),
+                                        (("run",), "config/can/shiftrig.dbc", "the mapping's DBC"),
                                         (("run", "--controller", "builtin:" + calibration), calibration, "the controller's calibration")):
             self.assert_refused(f"--record {output}: is the file of {what}, which it would overwrite",
                                 *arguments, "--scenario", scenario, "--record", output)
@@ -161,6 +167,16 @@ class Outputs(Commands):
         self.assertEqual((done.returncode, done.stderr), (2, "shiftrig: standard output cannot be written: Bad file descriptor\n"))
         with open(self.path("out.svg")) as file:
             self.assertTrue(file.read().startswith("<svg"))
+
+
+    def test_a_picture_takes_no_file_of_a_similar_name(self):
+        self.recorded("--duration", "0.5")
+        with open(self.path("p.png.svg"), "w") as file:
+            file.write("mine")
+        done = self.shiftrig("plot", "u.lcmlog", "-o", "p.png")  # also where there is no rsvg-convert
+        with open(self.path("p.png.svg")) as file:
+            self.assertEqual(file.read(), "mine")
+        self.assertEqual(sorted(set(os.listdir(self.folder)) - {"p.png"}), ["p.png.svg", "u.lcmlog"], done.stderr)
 
 
 class NotWhole(Commands):

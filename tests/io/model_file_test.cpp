@@ -220,7 +220,8 @@ TEST(ModelFile, NoMassIsCalledAsTheHousing) {
 }
 
 TEST(ModelFile, ALineBreakInANameLeavesTheRefusalOneLine) {
-    EXPECT_EQ(refusal(two_masses + "\"two\\nlines\": 1\n"), "m.yaml:5:1: two\\nlines is not a known key; nearest: engines");
+    EXPECT_EQ(refusal(two_masses + "\"two\\nlines\": 1\n"),
+              "m.yaml:5:1: two\\nlines is not a known key; nearest: engines");
     EXPECT_EQ(refusal(two_masses + "input_mass: \"a\\tb\\e[2Jc\"\n"),
               "m.yaml:5:1: input_mass = a\\tb\\x1b[2Jc; must name a mass; nearest: left");
 }
