@@ -3,12 +3,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <fstream>
-#include <sstream>
 #include <utility>
 
 #include "analysis/limits_text.h"
 #include "io/input_error.h"
+#include "io/text_file.h"
 
 namespace shiftrig::analysis {
 
@@ -123,6 +122,7 @@ Limits parse_limits(const std::string& text, const std::string& path) {
     } catch (const YAML::ParserException& error) {
         throw io::InputError(path, error.mark.line + 1, error.mark.column + 1, error.msg);
     }
+    if (root.IsNull()) throw io::InputError(path, 1, 1, "the file is empty");
     Limits limits;
     for (const auto& [key, value] : entries(path, "limits", root)) {
         if (key == "rules") {
@@ -141,11 +141,7 @@ Limits parse_limits(const std::string& text, const std::string& path) {
 }
 
 Limits read_limits(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) throw io::InputError(path + ": cannot be read");
-    std::ostringstream text;
-    text << file.rdbuf();
-    return parse_limits(text.str(), path);
+    return parse_limits(io::read_text(path), path);
 }
 
 }  // namespace shiftrig::analysis

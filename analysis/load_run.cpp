@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "io/recording/event_json.h"
+#include "io/recording/event_names.h"
 #include "io/recording/reader.h"
 #include "io/recording/rebuild.h"
 
@@ -23,15 +24,26 @@ const std::vector<double>& values_of(const io::RecordedTick& tick, io::Table tab
     return table == io::Table::inputs ? tick.inputs : table == io::Table::outputs ? tick.outputs : tick.rig;
 }
 
-// The rig's own changes, told from its signals: those of `rig.safe_command` and `bus.<message>.status`.
-std::optional<std::string> words(const std::string& signal, double before, double now) {
+// The rig's own changes, told from its signals, those of `rig.safe_command` and `bus.<message>.status`; kind and words
+// as the rig has them (apps/rig/events.h).
+std::optional<Change> own_change(const std::string& signal, double before, double now, double time) {
     static constexpr std::array statuses = {"never seen", "alive", "late", "lost", "corrupt"};
-    if (signal == "rig.safe_command" && now != before)
-        return now != 0 ? "the controller is silent: the safe command acts"
-                        : "valid commands are heard again";
+    char stamp[32];
+    std::snprintf(stamp, sizeof stamp, "t=%.7g ", time);
+    Change change;
+    change.event.time = time;
+    if (signal == "rig.safe_command" && now != before) {
+        change.kind = now != 0 ? "safe_command" : "commands_return";
+        change.text = stamp + std::string(now != 0 ? "the controller is silent: the safe command acts"
+                                                   : "valid commands are heard again");
+        return change;
+    }
     if (signal.starts_with("bus.") && signal.ends_with(".status") && now != before && now >= 0 &&
-        now < statuses.size())
-        return signal + ": " + statuses[static_cast<std::size_t>(now)];
+        now < statuses.size()) {
+        change.kind = "message_status";
+        change.text = stamp + signal + ": " + statuses[static_cast<std::size_t>(now)];
+        return change;
+    }
     return std::nullopt;
 }
 
@@ -71,20 +83,12 @@ Run load_run(const std::string& path, const std::vector<std::string>& signals) {
             run.columns[c].value.push_back(values_of(tick, sources[c].table)[sources[c].index]);
         for (const auto& event : tick.events)
             run.changes.push_back(
-                {event,
-                 event.device < 0 ? "" : manifest.devices[static_cast<std::size_t>(event.device)],
-                 plant::explain(model, event),
-                 {},
+                {event, event.device < 0 ? "" : manifest.devices[static_cast<std::size_t>(event.device)],
+                 plant::explain(model, event), std::string(io::name(event.kind)),
                  io::loop_members(event, manifest.devices)});
         for (std::size_t i = 0; i < tick.rig.size(); ++i)
-            if (const auto text = words(manifest.rig[i].name, rig_before[i], tick.rig[i])) {
-                char stamp[32];
-                std::snprintf(stamp, sizeof stamp, "t=%.7g ", time);
-                Change change;
-                change.event.time = time;
-                change.text = stamp + *text;
-                run.changes.push_back(std::move(change));
-            }
+            if (auto change = own_change(manifest.rig[i].name, rig_before[i], tick.rig[i], time))
+                run.changes.push_back(std::move(*change));
         rig_before = tick.rig;
     }
     std::stable_sort(run.changes.begin(), run.changes.end(),

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -11,6 +10,7 @@
 #include "io/input_error.h"
 #include "io/recording/reader.h"
 #include "io/recording/rebuild.h"
+#include "io/text_file.h"
 
 namespace shiftrig::analysis {
 
@@ -27,6 +27,20 @@ std::string run_name(const fs::path& path) {
             return file.substr(0, file.size() - ending.size());
     }
     return file;
+}
+
+// Of half a run, half of what happened is told: what went missing with the rest would pass for better.
+constexpr const char* only_whole = "; only whole runs are compared";
+
+// A result says itself whether its run came to its end and could be judged (`run --json`, `test --json`).
+void require_whole(const json& result, const std::string& where) {
+    if (const auto loop = result.find("loop"); loop != result.end() && loop->is_object()) {
+        const std::string outcome = loop->value("outcome", json("completed")).dump();
+        if (outcome != "\"completed\"")
+            throw io::InputError(where + " did not come to its end (outcome " + outcome + ")" + only_whole);
+    }
+    if (const auto error = result.find("error"); error != result.end() && error->is_string())
+        throw io::InputError(where + " could not be judged: " + error->get<std::string>());
 }
 
 // Somebody else may have written them: what is compared is held against its kind here.
@@ -63,12 +77,12 @@ class ResultSet {
         if (io::looks_like_recording(path.string())) {
             const plant::Description machine =
                 io::recorded_model_file(io::RecordingReader(path.string()).manifest()).description;
-            add(run_name(path), to_json(score(load_run(path.string(), scorecard_signals(machine)), limits_)),
-                path.string());
+            const Run run = load_run(path.string(), scorecard_signals(machine));
+            if (const auto why = run.incomplete(); !why.empty()) throw io::InputError(why + only_whole);
+            add(run_name(path), to_json(score(run, limits_)), path.string());
             return;
         }
-        std::ifstream file(path);
-        const json document = json::parse(file, nullptr, false);
+        const json document = json::parse(io::read_text(path.string()), nullptr, false);
         if (document.is_discarded()) throw io::InputError(path.string() + ": neither a recording nor JSON");
         take(document, run_name(path), path.string());
     }
@@ -87,6 +101,7 @@ class ResultSet {
                 if (document.contains(key) && document[key].is_string())
                     own = run_name(document[key].get<std::string>());
             }
+            require_whole(document, path + ": run \"" + own + "\"");
             add(own, document["shifts"], path);
         } else if (document.is_object() && document.contains("runs")) {
             take(document["runs"], name, path);

@@ -11,7 +11,8 @@ namespace shiftrig::analysis {
 // Reads a result set: a recording; a JSON file of `shiftrig run --json` or `shiftrig test --json` (an object with
 // "shifts", or an array of such objects, or an object with them in "runs"); or a folder of such files. A run is called
 // by its "scenario" or "name", else by its file. Result: {run name: shifts array}. Throws InputError or RecordingError,
-// also where two runs have one name.
+// also where two runs have one name, or one is not whole: a recording cut or damaged, a run that was stopped or gave up,
+// a scenario that could not be judged.
 nlohmann::json read_results(const std::string& path, const Limits& limits);
 
 }  // namespace shiftrig::analysis

@@ -35,6 +35,13 @@ struct Run {
     std::vector<std::pair<std::string, std::string>> identity;
     std::string model_text;
 
+    // Why it is not the whole run (its recording is cut or damaged): one line; empty if it is.
+    std::string incomplete() const {
+        for (const auto& [what, text] : identity)
+            if (what == "incomplete") return text;
+        return "";
+    }
+
     // nullptr if the run has no such signal.
     const std::vector<double>* column(std::string_view name) const noexcept {
         for (const auto& candidate : columns)

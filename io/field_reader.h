@@ -11,6 +11,7 @@
 // usually the reason for it; hence finish() after the list has run.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <set>
@@ -35,6 +36,9 @@ struct Alternative {
 
 template <class Value>
 using Choices = std::vector<std::pair<const char*, Value>>;
+
+// The word by which a device names the housing as its end: no mass may be called so.
+inline constexpr const char* housing = "housing";
 
 // What all readers of one file share.
 struct ReadContext {
@@ -105,7 +109,7 @@ class FieldReader {
     // A mass, or the word housing, which becomes the empty name.
     void link_or_housing(const char* key, std::string& value, const char*) {
         if (const Entry* entry = required(key)) value = word(*entry, key);
-        if (value == "housing") value.clear();
+        if (value == housing) value.clear();
     }
     void names(const char* key, std::vector<std::string>& values, const char*) {
         if (const Entry* entry = required(key)) read_names(*entry, key, values);
@@ -178,6 +182,9 @@ class FieldReader {
             if (item.key.empty() || item.key.find_first_not_of(name_letters) != std::string::npos)
                 fail(context_.path, item.mark,
                      std::string(kind) + " \"" + item.key + "\": a name is made of letters, digits and _");
+            if (kind == std::string("mass") && item.key == housing)
+                fail(context_.path, item.mark,
+                     "mass \"housing\": the word stands for the fixed housing, and can be no mass's name");
             context_.places.push_back({kind, item.key, "", "", item.mark.line + 1, item.mark.column + 1});
             Struct& value = values.emplace_back();
             value.name = item.key;
@@ -282,6 +289,7 @@ class FieldReader {
     double checked(const Entry& entry, const std::string& key, const Rule& rule) const {
         double value = 0;
         if (!YAML::convert<double>::decode(entry.value, value)) refuse(entry, key, "must be a number");
+        if (!std::isfinite(value)) refuse(entry, key, rules::any.words());
         if (!rule.holds(value)) refuse(entry, key, rule.words());
         return value;
     }

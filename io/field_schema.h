@@ -89,10 +89,12 @@ class FieldSchema {
         add(key, {{"type", "array"}, {"items", of<Struct>()}}, text);
     }
     template <class Struct>
-    void section(const char* key, const char*, std::vector<Struct>&, const char* text) {
+    void section(const char* key, const char* kind, std::vector<Struct>&, const char* text) {
+        const bool reserved = kind == std::string("mass");
+        const std::string but_not = reserved ? "(?!" + std::string(housing) + "$)" : "";
         add(key,
             {{"type", "object"},
-             {"propertyNames", {{"pattern", "^[A-Za-z0-9_]+$"}}},
+             {"propertyNames", {{"pattern", "^" + but_not + "[A-Za-z0-9_]+$"}}},
              {"additionalProperties", of<Struct>()}},
             text);
     }

@@ -29,11 +29,11 @@ std::vector<TimedSetting> by_time(const std::string& path, const std::vector<Tim
     return result;
 }
 
-// Where a key stands; 0 if it is not there.
-int line_of(const ReadContext& context, const std::string& key) {
+// Where a key stands; line 0 if it is not there.
+KeyPlace place_of(const ReadContext& context, const std::string& key) {
     for (const auto& place : context.places)
-        if (place.key == key) return place.line;
-    return 0;
+        if (place.key == key) return {place.line, place.column};
+    return {};
 }
 
 // An event is looked for in its window: one without time in it would forbid nothing.
@@ -73,16 +73,25 @@ Expectations expectations(const std::string& path, const ExpectText& text, doubl
             throw InputError(path, event.line, event.column, "expect: the event's kind is missing");
         check_window(path, event, duration);
     }
+    const auto check_order = [&](const auto& bound, int line, int column, const std::string& what) {
+        if (bound.maximum < bound.minimum)
+            throw InputError(path, line, column,
+                             "expect: " + what + " max = " + in_digits(bound.maximum) +
+                                 "; must be at least min = " + in_digits(bound.minimum));
+    };
     for (auto& bound : expect.signals) {
         if (bound.minimum == -rules::unbounded && bound.maximum == rules::unbounded)
             throw InputError(path, bound.quantity.line, bound.quantity.column,
                              "expect: " + bound.quantity.written + " needs min or max");
+        check_order(bound, bound.quantity.line, bound.quantity.column, bound.quantity.written);
         bound.minimum *= bound.quantity.factor;
         bound.maximum *= bound.quantity.factor;
     }
-    for (const auto& limit : expect.metrics)
+    for (const auto& limit : expect.metrics) {
         if (limit.minimum == -rules::unbounded && limit.maximum == rules::unbounded)
             throw InputError(path, limit.line, limit.column, "expect: " + limit.metric + " needs min or max");
+        check_order(limit, limit.line, limit.column, limit.metric);
+    }
     return expect;
 }
 
@@ -130,11 +139,12 @@ ScenarioFile parse_scenario(const std::string& text, const std::string& path) {
     scenario.text = text;
     scenario.name = place.stem().string();
     scenario.model_path = (place.parent_path() / written.model).lexically_normal().string();
-    scenario.start.options_line = line_of(context, "start.options");
-    scenario.start.locked_line = line_of(context, "start.locked");
+    scenario.model_place = place_of(context, "model");
+    scenario.start.options_place = place_of(context, "start.options");
+    scenario.start.locked_place = place_of(context, "start.locked");
     scenario.timeline = by_time(path, written.timeline, scenario.duration);
     scenario.expect = expectations(path, written.expect, scenario.duration);
-    scenario.expect.no_shifts_line = line_of(context, "expect.no_shifts");
+    scenario.expect.no_shifts_line = place_of(context, "expect.no_shifts").line;
     return scenario;
 }
 

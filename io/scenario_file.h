@@ -53,12 +53,17 @@ struct TimedSetting {
     Setting setting;
 };
 
+// Where a key stands in the file, for what is found wrong with it later; line 0: it is not there.
+struct KeyPlace {
+    int line = 0, column = 0;
+};
+
 struct ScenarioStart {
     std::vector<std::pair<std::string, std::string>> options;  // gear → option in use: {range, M}
     std::vector<std::string> locked;                           // devices locked at the start
     std::vector<Setting> speeds;  // quantity.signal is the mass's name; [rad/s] or [m/s]
     std::vector<Setting> inputs;  // held from the start on (plant's and driver's signals)
-    int options_line = 0, locked_line = 0;
+    KeyPlace options_place, locked_place;
     double settle = 0;  // [s] the plant runs under `inputs` before time 0, without the controller
 };
 
@@ -114,7 +119,8 @@ struct ScenarioFile {
     std::string name;         // the file's name without folder and extension
     std::string description;  // one line
     std::string model_path;   // resolved against the scenario's folder
-    double duration = 0;      // [s]
+    KeyPlace model_place;
+    double duration = 0;  // [s]
     ScenarioStart start;
     std::vector<TimedSetting> timeline;  // sorted by `at`, file order where equal
     int seed = 1;                        // of sensor noise, and of bus faults that name no other

@@ -1,22 +1,8 @@
 #include "io/yaml_document.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <sstream>
 
 namespace shiftrig::io {
-
-std::string read_text(const std::string& path) {
-    errno = 0;
-    std::ifstream file(path, std::ios::binary);
-    std::ostringstream text;
-    if (file && file.peek() != std::ifstream::traits_type::eof()) text << file.rdbuf();
-    if (!file && errno != 0)
-        throw InputError(path, 0, 0, std::string("cannot be read: ") + std::strerror(errno));
-    return text.str();
-}
 
 void fail(const std::string& path, const YAML::Mark& mark, const std::string& what) {
     throw InputError(path, mark.line + 1, mark.column + 1, what);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "io/input_error.h"
+#include "io/text_file.h"
 
 namespace shiftrig::io {
 
@@ -16,9 +17,6 @@ struct Entry {
     YAML::Mark mark;  // of the key
     YAML::Node value;
 };
-
-// The whole file's text; throws InputError if it cannot be read.
-std::string read_text(const std::string& path);
 
 // The document's root; throws InputError naming the place of a syntax error or an empty document.
 YAML::Node parse_yaml(const std::string& text, const std::string& path);

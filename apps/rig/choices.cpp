@@ -89,6 +89,9 @@ void choose_controller(const Choices& choices, Setup& setup) {
         return std::count(buses.names.begin(), buses.names.end(), "inprocess") > 0;
     };
 
+    if (!choices.can_replay.empty() && !controller.empty() && controller != "none")
+        throw std::invalid_argument("--can-replay and --controller " + controller +
+                                    " exclude each other: the log takes the controller's place");
     if (controller.empty()) {
         const bool nobody = scripted.none || !choices.can_replay.empty() || !setup.model.can.IsDefined() ||
                             (!buses.names.empty() && !inprocess_given());
@@ -101,6 +104,18 @@ void choose_controller(const Choices& choices, Setup& setup) {
     const std::string given = controller.size() > 8 ? controller.substr(8) : scripted.calibration;
     const std::string path = given.empty() ? shipped_calibration() : given;
     build_in(buses, io::read_text(path), path);
+}
+
+// What is wrong within the model is told with the model's place, that there is none with the scenario's.
+io::ModelFile model_of(const io::ScenarioFile& scenario) {
+    std::string text;
+    try {
+        text = io::read_text(scenario.model_path);
+    } catch (const io::InputError& error) {
+        throw io::InputError(scenario.path, scenario.model_place.line, scenario.model_place.column,
+                             std::string("model: ") + error.what());
+    }
+    return io::parse_model(text, scenario.model_path);
 }
 
 Setup complete(const Choices& choices, Setup setup) {
@@ -146,7 +161,7 @@ Setup make_setup(const Choices& choices) {
 
 Setup make_setup(const Choices& choices, io::ScenarioFile scenario) {
     Setup setup;
-    setup.model = io::read_model(choices.model.empty() ? scenario.model_path : choices.model);
+    setup.model = choices.model.empty() ? model_of(scenario) : io::read_model(choices.model);
     setup.scenario = std::move(scenario);
     return complete(choices, std::move(setup));
 }

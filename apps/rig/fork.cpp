@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "apps/rig/snapshot.h"
+#include "io/recording/csv.h"
 #include "io/signals.h"
 #include "io/units.h"
 #include "io/yaml_document.h"
@@ -41,6 +42,7 @@ class Brancher {
         ticks_ = std::llround(options.duration * 1e9 / static_cast<double>(setup_.tick_ns));
         for (const auto& v : plan.variations())
             signals_.push_back(v.target == Variation::Target::signal ? found(v) : Settable{});
+        refuse_repeated();
 
         // The history's columns that the rig still has, with room for the branch.
         run_.machine = setup_.model.description;
@@ -99,10 +101,14 @@ class Brancher {
             const int signal = table.find(name.substr(0, name.size() - unit->suffix.size()));
             if (signal >= 0 && unit->unit == table.signal(signal).unit) return {signal, unit->factor};
         }
+        if (const int signal = table.find(name); signal >= 0)
+            throw io::InputError("--vary " + name + ": must be written with its unit: " + name + " ends in " +
+                                 io::suffixes_of(table.signal(signal).unit));
         std::string near;
-        for (const auto& known : table.nearest(name)) near += (near.empty() ? "" : ", ") + known;
+        for (const auto& known : table.nearest(name))
+            near += (near.empty() ? "" : ", ") + io::column_name(table.signal(table.find(known)));
         throw io::InputError("--vary " + name +
-                             ": no such signal, or without its unit's suffix; near: " + near);
+                             ": no such signal, or not with its unit's suffix; nearest: " + near);
     }
 
     // The signal varied, within its range in every branch.
@@ -124,6 +130,21 @@ class Brancher {
             if (whole && wanted != std::floor(wanted)) refuse("must be a whole number");
         }
         return settable;
+    }
+
+    // Of two values for one thing only the last would count, whatever the table of branches says.
+    void refuse_repeated() const {
+        const auto& all = plan_.variations();
+        for (std::size_t i = 0; i < all.size(); ++i)
+            for (std::size_t j = 0; j < i; ++j) {
+                const bool same =
+                    all[i].target == Variation::Target::signal
+                        ? all[j].target == all[i].target && signals_[j].signal == signals_[i].signal
+                        : all[j].target == all[i].target && all[j].name == all[i].name;
+                if (same)
+                    throw io::InputError("--vary " + full_name(all[i]) + ": is varied already" +
+                                         (all[j].name == all[i].name ? "" : ", as " + full_name(all[j])));
+            }
     }
 
     // The branch's values in the texts of the model and the calibration.

@@ -23,7 +23,8 @@ Setup with_options(Setup setup) {
         for (const auto& [gear, option] : start.options)
             io::select_option(setup.model.description, gear, option);
     } catch (const std::invalid_argument& error) {
-        throw io::InputError(setup.scenario->path, start.options_line, 0, error.what());
+        throw io::InputError(setup.scenario->path, start.options_place.line, start.options_place.column,
+                             error.what());
     }
     setup.buses.seed = static_cast<std::uint64_t>(setup.scenario->seed);
     return setup;
@@ -122,10 +123,11 @@ void Rig::start_plant(const plant::Start& start, const io::ScenarioFile& scenari
     try {
         plant::start(model_, state_, start, inputs_);
     } catch (const plant::ModelError& error) {
-        int line = scenario.start.locked_line;
+        io::KeyPlace place = scenario.start.locked_place;
         for (const auto& speed : scenario.start.speeds)
-            if (error.field == "speeds" && speed.quantity.signal == error.device) line = speed.quantity.line;
-        throw io::InputError(scenario.path, line, 0, error.what());
+            if (error.field == "speeds" && speed.quantity.signal == error.device)
+                place = {speed.quantity.line, speed.quantity.column};
+        throw io::InputError(scenario.path, place.line, place.column, error.what());
     }
 }
 

@@ -55,6 +55,13 @@ YAML::Node resolved(const std::string& path, const YAML::Node& node) {
 
 }  // namespace
 
+std::string full_name(const Variation& v) {
+    const char* prefix = v.target == Variation::Target::calibration ? "calibration."
+                         : v.target == Variation::Target::model     ? "model."
+                                                                    : "";
+    return prefix + v.name;
+}
+
 Variation parse_variation(const std::string& text) {
     const auto equals = text.find('=');
     if (equals == std::string::npos || equals == 0)

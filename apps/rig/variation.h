@@ -28,6 +28,9 @@ struct Variation {
     bool relative = false;  // factors of what it is
 };
 
+// "calibration.shift.fill_time_s"
+std::string full_name(const Variation& v);
+
 // Throws InputError: one clear line.
 Variation parse_variation(const std::string& text);
 

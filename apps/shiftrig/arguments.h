@@ -3,11 +3,13 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
 
+#include "io/model_file.h"
 #include "io/number.h"
 #include "io/rule.h"
 
@@ -49,6 +51,15 @@ inline std::pair<std::string, double> named_number(const std::string& option, co
     const auto value = io::finite_number(word);
     if (!value) throw CLI::ValidationError(option, "\"" + text + "\": \"" + word + "\" is no finite number");
     return {name, *value};
+}
+
+// --option GEAR=OPTION
+inline void select_option(io::ModelFile& file, const std::string& gear, const std::string& option) {
+    try {
+        io::select_option(file.description, gear, option);
+    } catch (const std::invalid_argument& error) {
+        throw CLI::ValidationError("--option " + gear + "=" + option, file.path + ": " + error.what());
+    }
 }
 
 }  // namespace shiftrig::cli

@@ -8,6 +8,7 @@
 #include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/examination.h"
+#include "apps/shiftrig/files.h"
 #include "io/model_file.h"
 #include "io/scenario_file.h"
 
@@ -16,6 +17,7 @@ namespace {
 
 struct Options {
     std::string model, schema, dot, svg;
+    Files files;
     bool json = false, shapes = false;
     double rate_hz = 1000;
 };
@@ -44,20 +46,26 @@ int run(const Options& options) {
 
 Command::Run declare_check(CLI::App& app) {
     auto options = std::make_shared<Options>();
-    app.add_option(
+    Files& files = options->files;
+    files.read(app.add_option(
         "MODEL", options->model,
         "model file (YAML); warned of are efficiencies below 0.5, rigid parts and initial speeds that "
-        "contradict one another, what a step cannot resolve, and modes that an engine's main order meets");
+        "contradict one another, what a step cannot resolve, and modes that an engine's main order meets"));
     app.add_flag("--json", options->json, "print one JSON object");
     app.add_flag("--shapes", options->shapes, "print the mode shapes of every gear and state");
     add_number(app, "--rate-hz", options->rate_hz, {1, 1e5},
                "of the run to be: warn of what its steps cannot resolve")
         ->capture_default_str();
-    app.add_option("--dot", options->dot, "write the driveline as Graphviz text into this file");
-    app.add_option("--svg", options->svg, "draw the driveline and its gear table into this file");
+    files.written(
+        app.add_option("--dot", options->dot, "write the driveline as Graphviz text into this file"));
+    files.written(
+        app.add_option("--svg", options->svg, "draw the driveline and its gear table into this file"));
     app.add_option("--schema", options->schema, "print the JSON Schema of model or scenario files")
         ->check(CLI::IsMember({"model", "scenario"}));
-    return [options] { return run(*options); };
+    return [options] {
+        options->files.check();
+        return run(*options);
+    };
 }
 
 const Command check("check",

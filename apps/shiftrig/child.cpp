@@ -43,6 +43,13 @@ std::optional<std::string> Child::ended() {
     int status = 0;
     if (waitpid(process_, &status, WNOHANG) <= 0) return std::nullopt;
     process_ = -1;
+    constexpr int not_executable = 126,
+                  not_found = 127;  // what a shell ends with [POSIX, Exit Status for Commands]
+    no_program_ =
+        WIFEXITED(status) && (WEXITSTATUS(status) == not_executable || WEXITSTATUS(status) == not_found);
+    if (no_program_)
+        return "controller \"" + command_ + "\" could not be started (status " +
+               std::to_string(WEXITSTATUS(status)) + ")";
     const std::string how = WIFSIGNALED(status) ? "was ended by signal " + std::to_string(WTERMSIG(status))
                                                 : "ended with status " + std::to_string(WEXITSTATUS(status));
     return "controller \"" + command_ + "\" " + how;

@@ -18,10 +18,13 @@ class Child {
 
     // Once, when it has ended by itself: how, in words.
     std::optional<std::string> ended();
+    // It has ended so, because there is no such program or it is none that can be started.
+    bool was_no_program() const noexcept { return no_program_; }
 
   private:
     std::string command_;
     pid_t process_ = -1;
+    bool no_program_ = false;
 };
 
 }  // namespace shiftrig::cli

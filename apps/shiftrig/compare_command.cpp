@@ -76,7 +76,7 @@ Command::Run declare(CLI::App& app) {
                "changes up to this many percent are none")
         ->capture_default_str();
     app.add_flag("--json", options->json, "for programs");
-    app.footer("Exit code 1 if anything got worse or a shift is missing.");
+    app.footer("Exit code 1 if anything got worse or a shift is missing, 2 if a run is not whole.");
     return [options] { return run(*options); };
 }
 

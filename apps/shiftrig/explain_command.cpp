@@ -4,10 +4,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "analysis/change_json.h"
 #include "analysis/load_run.h"
 #include "apps/shiftrig/command.h"
 #include "io/nearest.h"
-#include "io/recording/event_json.h"
 #include "io/recording/reader.h"
 
 namespace shiftrig::cli {
@@ -39,20 +39,13 @@ int run(const Options& options) {
             std::cout << change.text << '\n';
             continue;
         }
-        if (change.device.empty()) {
-            list.push_back({{"time_s", change.event.time}, {"device", ""}, {"text", change.text}});
-        } else {
-            list.push_back(io::event_json(change.event, change.device, change.members));
-            list.back()["text"] = change.text;
-        }
+        list.push_back(analysis::to_json(change));
     }
     if (options.json) std::cout << list.dump(2) << '\n';
-    for (const auto& [what, text] : recorded.identity)
-        if (what == "incomplete") {
-            std::cerr << text << '\n';
-            return bad_input;
-        }
-    return good;
+    const std::string incomplete = recorded.incomplete();
+    if (incomplete.empty()) return good;
+    std::cerr << incomplete << '\n';
+    return bad_input;
 }
 
 Command::Run declare(CLI::App& app) {

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "apps/shiftrig/command.h"
+#include "apps/shiftrig/files.h"
 #include "io/recording/candump.h"
 #include "io/recording/csv.h"
 #include "io/recording/mcap.h"
@@ -14,6 +15,7 @@ namespace {
 
 struct Options {
     std::string recording, csv, mcap, candump;
+    Files files;
 };
 
 using Export = std::int64_t (*)(io::RecordingReader&, const std::string&);
@@ -39,15 +41,22 @@ int run(const Options& options) {
 
 Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<Options>();
-    app.add_option("RECORDING", options->recording, "what `shiftrig run --record` wrote")->required();
-    auto* formats = app.add_option_group("formats");
-    formats->add_option("--csv", options->csv, "a column per signal, a row per tick; - is standard output");
-    formats->add_option("--mcap", options->mcap, "for Foxglove and PlotJuggler");
-    formats->add_option(
-        "--candump", options->candump,
+    Files& files = options->files;
+    files.read(
+        app.add_option("RECORDING", options->recording, "what `shiftrig run --record` wrote")->required());
+    auto* formats = app.add_option_group("formats (- is standard output)");
+    const auto add = [&](const char* name, std::string& path, const char* help) {
+        files.written(formats->add_option(name, path, help), StandardOutput::yes);
+    };
+    add("--csv", options->csv, "a column per signal, a row per tick");
+    add("--mcap", options->mcap, "for Foxglove and PlotJuggler");
+    add("--candump", options->candump,
         "the signals as frames of the machine's CAN mapping; python-can makes BLF or ASC of it");
     formats->require_option(1, 0);
-    return [options] { return run(*options); };
+    return [options] {
+        options->files.check();
+        return run(*options);
+    };
 }
 
 const Command export_command("export", "a recording as CSV, MCAP or candump log", declare);

@@ -29,13 +29,6 @@ struct Options {
     bool json = false;
 };
 
-std::string full_name(const rig::Variation& v) {
-    const char* prefix = v.target == rig::Variation::Target::calibration ? "calibration."
-                         : v.target == rig::Variation::Target::model     ? "model."
-                                                                         : "";
-    return prefix + v.name;
-}
-
 nlohmann::json to_json(const rig::Branch& branch, const rig::Plan& plan) {
     nlohmann::json out{{"branch", branch.number},
                        {"shifted", branch.shifted},

@@ -2,8 +2,6 @@
 
 namespace shiftrig::cli {
 
-namespace {
-
 const char* name(rt::Outcome outcome) {
     switch (outcome) {
         case rt::Outcome::completed:
@@ -17,8 +15,6 @@ const char* name(rt::Outcome outcome) {
     }
     return "";
 }
-
-}  // namespace
 
 nlohmann::json to_json(const rt::Histogram& histogram) {
     return {{"count", histogram.count()},

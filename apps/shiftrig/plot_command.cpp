@@ -9,11 +9,13 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "analysis/load_run.h"
 #include "analysis/plot.h"
 #include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/command.h"
+#include "apps/shiftrig/files.h"
 
 namespace shiftrig::cli {
 
@@ -21,6 +23,7 @@ namespace {
 
 struct Options {
     std::string recording, output;
+    Files files;
     int shift = 1;
     double from = -1, until = -1;
     int width = 900;
@@ -78,30 +81,37 @@ analysis::Plot plot_of(const analysis::Run& run, const Options& options) {
 int run(const Options& options) {
     const bool png = ends_with(options.output, ".png");
     if (!png && !ends_with(options.output, ".svg")) throw std::runtime_error("-o: must end in .svg or .png");
-    const std::string svg =
-        analysis::to_svg(plot_of(analysis::load_run(options.recording), options), options.width);
-    const std::string path = png ? options.output + ".svg" : options.output;
+    const analysis::Run run = analysis::load_run(options.recording);
+    const std::string svg = analysis::to_svg(plot_of(run, options), options.width);
+    std::optional<PassingFile> vectors;
+    if (png) vectors.emplace(options.output, ".svg");
+    const std::string path = png ? vectors->path() : options.output;
     std::ofstream file(path);
     file << svg;
     file.close();
     if (!file) throw std::runtime_error(path + ": cannot be written");
-    if (png) {
-        convert(path, options.output);
-        unlink(path.c_str());
-    }
-    return good;
+    if (png) convert(path, options.output);
+    // What can be read is drawn; what ended the reading early is told.
+    const std::string incomplete = run.incomplete();
+    if (incomplete.empty()) return good;
+    std::cerr << incomplete << '\n';
+    return bad_input;
 }
 
 Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<Options>();
-    app.add_option("RECORDING", options->recording, "of shiftrig run --record")->required();
-    app.add_option("-o,--output", options->output, "picture, .svg or .png")->required();
+    Files& files = options->files;
+    files.read(app.add_option("RECORDING", options->recording, "of shiftrig run --record")->required());
+    files.written(app.add_option("-o,--output", options->output, "picture, .svg or .png")->required());
     add_number(app, "--shift", options->shift, {1, 1e6}, "which shift of the recording, from 1")
         ->capture_default_str();
     add_number(app, "--from", options->from, {0, longest_s}, "instead of a shift: from this time on [s]");
     add_number(app, "--until", options->until, {0, longest_s}, "until this time [s]");
     add_number(app, "--width", options->width, {300, 4000}, "[px]")->capture_default_str();
-    return [options] { return run(*options); };
+    return [options] {
+        options->files.check();
+        return run(*options);
+    };
 }
 
 const Command plot("plot", "a shift, or any stretch of a recording, as a picture", declare);

@@ -41,6 +41,11 @@ double time_of(const io::Manifest& manifest, std::int64_t tick) {
     return 1e-9 * static_cast<double>((tick + 1) * manifest.tick_ns);
 }
 
+// What the solver says of itself (how well a step closed, how it got there) is no difference of two machines.
+bool is_of_the_machine(const plant::Signal& signal) {
+    return !signal.name.starts_with("certificate.") && signal.name != "energy.defect";
+}
+
 nlohmann::json to_json(const io::RecordingReader& reader, const io::ReplayResult& result, bool other_model) {
     nlohmann::json out{{"recording", reader.path()},     {"ticks", result.ticks},
                        {"compared", result.compared},    {"lost", result.lost},
@@ -53,7 +58,7 @@ nlohmann::json to_json(const io::RecordingReader& reader, const io::ReplayResult
     if (!other_model) return out;
     out["deviations"] = nlohmann::json::array();
     for (const auto& d : result.deviations)
-        if (d.count > 0)
+        if (d.count > 0 && is_of_the_machine(d.signal))
             out["deviations"].push_back({{"signal", io::column_name(d.signal)},
                                          {"worst", d.worst},
                                          {"time_s", time_of(reader.manifest(), d.worst_tick)},
@@ -66,11 +71,13 @@ nlohmann::json to_json(const io::RecordingReader& reader, const io::ReplayResult
 // Largest first, measured against what the signal ranges over: N and rad/s cannot be ranked otherwise.
 void print_deviations(const io::RecordingReader& reader, std::vector<io::Deviation> deviations) {
     const auto weight = [](const io::Deviation& d) { return d.worst / std::max(1.0, std::abs(d.recorded)); };
-    std::erase_if(deviations, [](const io::Deviation& d) { return d.worst == 0 || d.count == 0; });
+    std::erase_if(deviations, [](const io::Deviation& d) {
+        return d.worst == 0 || d.count == 0 || !is_of_the_machine(d.signal);
+    });
     std::stable_sort(deviations.begin(), deviations.end(),
                      [&](const auto& a, const auto& b) { return weight(a) > weight(b); });
     if (deviations.empty()) {
-        std::cout << "every output is the same to the bit\n";
+        std::cout << "every output of the machine is the same to the bit\n";
         return;
     }
     std::printf("%-44s %12s %10s %14s %14s %12s\n", "signal", "largest", "at [s]", "recorded", "replayed",
@@ -163,7 +170,7 @@ int run_field(const Options& options) {
     io::FieldRecording recording = read_field(options, file);
     for (const auto& text : options.options) {
         const auto [gear, option] = named_word("--option", text);
-        io::select_option(file.description, gear, option);
+        select_option(file, gear, option);
     }
     plant::BuildOptions build;
     build.step_size = options.step_s;

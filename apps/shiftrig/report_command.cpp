@@ -11,6 +11,7 @@
 #include "analysis/report/report.h"
 #include "analysis/report/shift_page.h"
 #include "apps/shiftrig/command.h"
+#include "apps/shiftrig/files.h"
 #include "io/recording/reader.h"
 #include "io/recording/rebuild.h"
 
@@ -20,6 +21,7 @@ namespace {
 
 struct Options {
     std::string recording, output, limits;
+    Files files;
     bool json = false;
 };
 
@@ -49,10 +51,12 @@ int run(const Options& options) {
         options.limits.empty() ? analysis::default_limits() : analysis::read_limits(options.limits);
     const analysis::Run run = analysis::load_run(options.recording, wanted_signals(options.recording));
     const analysis::Scorecard card = analysis::score(run, limits);
-    for (const auto& [name, value] : run.identity)
-        if (name == "incomplete") std::cerr << value << '\n';
+    // What can be read is judged; what ended the reading early is told.
+    const std::string incomplete = run.incomplete();
+    if (!incomplete.empty()) std::cerr << incomplete << '\n';
+    const int code = incomplete.empty() ? good : bad_input;
     if (options.json) print_json(card);
-    if (options.output.empty()) return good;
+    if (options.output.empty()) return code;
 
     analysis::ReportOptions report;
     report.title = run.machine.name;
@@ -69,17 +73,22 @@ int run(const Options& options) {
     if (!options.json)
         std::cout << options.output << ": " << card.shifts.size() << " shifts, verdict "
                   << analysis::name(card.verdict) << '\n';
-    return good;
+    return code;
 }
 
 Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<Options>();
-    app.add_option("RECORDING", options->recording, "of shiftrig run --record")->required();
-    app.add_option("-o,--output", options->output, "the page (.html)");
+    Files& files = options->files;
+    files.read(app.add_option("RECORDING", options->recording, "of shiftrig run --record")->required());
+    files.written(app.add_option("-o,--output", options->output, "the page (.html)"));
     app.add_flag("--json", options->json, "print the scorecard as one JSON object");
-    app.add_option("--limits", options->limits,
-                   "what is good and what is rejected (YAML); else config/limits.yaml as built in");
-    return [options] { return run(*options); };
+    files.read(
+        app.add_option("--limits", options->limits,
+                       "what is good and what is rejected (YAML); else config/limits.yaml as built in"));
+    return [options] {
+        options->files.check();
+        return run(*options);
+    };
 }
 
 const Command command("report", "a recording as one self-contained HTML page, or its scorecard as JSON",

@@ -24,6 +24,7 @@ void refuse_what_a_snapshot_settles(const CLI::App& app, const rig::Choices& cho
 std::unique_ptr<rig::Rig> resumed_rig(const std::string& from, const RigOptions& options) {
     const io::Manifest snapshot = io::read_snapshot(from);
     rig::Setup setup = rig::setup_of(snapshot);
+    options.check_files(setup);
     setup.buses.lockstep = options.pacing() == rt::Pace::lockstep;
     setup.buses.can_log = options.choices.can_log;
     if (setup.buses.built_in && !options.choices.controller.empty())

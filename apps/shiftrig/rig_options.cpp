@@ -5,12 +5,14 @@
 
 #include "apps/rig/rehearsal.h"
 #include "apps/shiftrig/arguments.h"
+#include "io/can/mapping.h"
 
 namespace shiftrig::cli {
 
 void RigOptions::add_to(CLI::App& app) {
-    app.add_option("MODEL", choices.model, "the machine (YAML); may be left out where a scenario names it");
-    app.add_option("--scenario", choices.scenario, "what happens to it (YAML)");
+    files.read(app.add_option("MODEL", choices.model,
+                              "the machine (YAML); may be left out where a scenario names it"));
+    files.read(app.add_option("--scenario", choices.scenario, "what happens to it (YAML)"));
     add_number(app, "--duration", duration_s, {0, longest_s, true},
                "simulated seconds; else the scenario's, else until SIGINT");
     add_common_to(app);
@@ -80,6 +82,19 @@ rt::LoopSettings RigOptions::loop(const rig::Setup& setup) const {
     if (duration > 0) settings.slots = std::llround(duration * 1e9 / static_cast<double>(setup.tick_ns));
     if (settings.slots == 0) throw std::invalid_argument("--duration: less than half a tick");
     return settings;
+}
+
+void RigOptions::check_files(const rig::Setup& setup) const {
+    std::vector<NamedFile> read = {{"the model", setup.model.path}};
+    if (setup.scenario) read.push_back({"the scenario", setup.scenario->path});
+    if (!setup.buses.calibration_path.empty())
+        read.push_back({"the controller's calibration", setup.buses.calibration_path});
+    if (setup.model.can.IsDefined()) {
+        const io::can::Mapping mapping = io::can::parse_mapping(setup.model.can, setup.model.path);
+        read.push_back({"the CAN mapping", mapping.file});
+        read.push_back({"the mapping's DBC", mapping.database.file});
+    }
+    files.check(read);
 }
 
 void rehearse(const RigOptions& options, rig::Rig& rig) {

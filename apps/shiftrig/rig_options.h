@@ -6,6 +6,7 @@
 #include <string>
 
 #include "apps/rig/choices.h"
+#include "apps/shiftrig/files.h"
 #include "rt/loop.h"
 #include "rt/thread.h"
 
@@ -13,6 +14,7 @@ namespace shiftrig::cli {
 
 struct RigOptions {
     rig::Choices choices;
+    Files files;
     std::string pace = "wall";         // wall, lockstep, free
     double factor = 1;                 // simulated per wall time
     std::optional<double> duration_s;  // else the scenario's, else without end
@@ -30,6 +32,8 @@ struct RigOptions {
     void add_common_to(CLI::App& app, const std::string& usual_pace = "wall");
     // Of the loop of a rig built from `choices`.
     rt::LoopSettings loop(const rig::Setup& setup) const;
+    // Once it is known what the rig's files name themselves: nothing that is written is one of those either.
+    void check_files(const rig::Setup& setup) const;
     rt::Pace pacing() const;
 };
 

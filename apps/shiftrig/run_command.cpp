@@ -13,6 +13,7 @@
 #include <memory>
 #include <thread>
 
+#include "analysis/change_json.h"
 #include "analysis/scorecard.h"
 #include "apps/rig/session.h"
 #include "apps/rig/snapshot.h"
@@ -20,12 +21,12 @@
 #include "apps/shiftrig/certificate_report.h"
 #include "apps/shiftrig/child.h"
 #include "apps/shiftrig/command.h"
+#include "apps/shiftrig/ending_signals.h"
 #include "apps/shiftrig/live_line.h"
 #include "apps/shiftrig/loop_report.h"
 #include "apps/shiftrig/resumed_rig.h"
 #include "apps/shiftrig/rig_options.h"
 #include "io/recording/csv.h"
-#include "io/recording/event_json.h"
 #include "io/recording/reader.h"
 #include "plant/warnings.h"
 #include "rt/machine.h"
@@ -47,7 +48,9 @@ std::unique_ptr<rig::Rig> make_rig(const RunOptions& options) {
     if (!options.from.empty()) return resumed_rig(options.from, options);
     rig::Choices choices = options.choices;
     choices.lockstep = options.pacing() == rt::Pace::lockstep;
-    return std::make_unique<rig::Rig>(rig::make_setup(choices));
+    rig::Setup setup = rig::make_setup(choices);
+    options.check_files(setup);
+    return std::make_unique<rig::Rig>(std::move(setup));
 }
 
 // What the model file says of its start, where that counts: a scenario and a snapshot may have brought their own.
@@ -60,7 +63,19 @@ void warn_of_initial_speeds(const RunOptions& options, const rig::Rig& rig) {
     if (!warning.empty()) std::cerr << warning << '\n';
 }
 
-// SIGINT and SIGTERM end the run as if its time were over.
+// Nothing is taken outside of the run: `slots` ticks from where the rig stands.
+void check_snapshot_time(double at_s, const rig::Rig& rig, std::int64_t slots) {
+    const std::int64_t tick_ns = rig.setup().tick_ns;
+    const std::int64_t at = (std::llround(at_s * 1e9) + tick_ns - 1) / tick_ns;  // the tick that ends there
+    const auto refuse = [&](const char* what, std::int64_t tick) {
+        const double time = 1e-9 * static_cast<double>(tick) * static_cast<double>(tick_ns);
+        throw std::invalid_argument("--snapshot-at " + io::in_digits(at_s) + ": the run " + what + " " +
+                                    io::in_digits(time) + " s");
+    };
+    if (at < rig.ticks()) refuse("goes on from", rig.ticks());
+    if (at > rig.ticks() + slots) refuse("ends at", rig.ticks() + slots);
+}
+
 std::atomic<rt::LoopControl*> running{nullptr};
 
 void on_signal(int) {
@@ -73,41 +88,27 @@ class SignalsStop {
         running = &control;
         struct sigaction action = {};
         action.sa_handler = on_signal;
-        sigaction(SIGINT, &action, nullptr);
-        sigaction(SIGTERM, &action, nullptr);
+        for (const int signal : ending_signals()) sigaction(signal, &action, nullptr);
     }
     ~SignalsStop() { running = nullptr; }
 };
 
-// Gives the controller its time, unless the run is over before it began.
-void get_ready(const RunOptions& options, const rt::LoopControl& control) {
+// Gives the controller its time, unless the run is over before it began. False if it turns out to be no program.
+bool get_ready(const RunOptions& options, const rt::LoopControl& control, Child& controller) {
     using Clock = std::chrono::steady_clock;
     const auto begin = Clock::now() + std::chrono::duration<double>(options.controller_start_s);
-    while (Clock::now() < begin && !control.stopping())
+    while (Clock::now() < begin && !control.stopping()) {
         std::this_thread::sleep_for(
             std::min<std::chrono::duration<double>>(begin - Clock::now(), std::chrono::milliseconds(20)));
-}
-
-// A recording for the CSV alone: beside it, under a name that nobody has, gone with the run however that ends.
-class PassingRecording {
-  public:
-    explicit PassingRecording(const std::string& csv) : path_(csv + ".XXXXXX.lcmlog") {
-        const int file = mkstemps(path_.data(), std::strlen(".lcmlog"));
-        if (file < 0) throw io::RecordingError(csv + ": cannot be written: " + std::strerror(errno));
-        close(file);
+        if (const auto how = controller.ended()) std::cerr << *how << '\n';
+        if (controller.was_no_program()) return false;
     }
-    PassingRecording(const PassingRecording&) = delete;
-    PassingRecording& operator=(const PassingRecording&) = delete;
-    ~PassingRecording() { unlink(path_.c_str()); }
-    const std::string& path() const noexcept { return path_; }
-
-  private:
-    std::string path_;
-};
+    return true;
+}
 
 // What the session needs beside the rig, and what is left of it afterwards.
 struct Beside {
-    std::unique_ptr<PassingRecording> passing;  // where only CSV was asked for
+    std::unique_ptr<PassingFile> passing;  // a recording for the CSV alone
     std::unique_ptr<io::RecordingWriter> recording;
     std::string recording_path;  // "" if nothing is recorded
     std::unique_ptr<rig::Collector> collector;
@@ -119,7 +120,7 @@ Beside prepare(const RunOptions& options, const rig::Rig& rig, const rt::LoopSet
     Beside beside;
     beside.recording_path = options.record;
     if (options.record.empty() && !options.csv.empty()) {
-        beside.passing = std::make_unique<PassingRecording>(options.csv);
+        beside.passing = std::make_unique<PassingFile>(options.csv, ".lcmlog");
         beside.recording_path = beside.passing->path();
     }
     if (!beside.recording_path.empty())
@@ -128,14 +129,6 @@ Beside prepare(const RunOptions& options, const rig::Rig& rig, const rt::LoopSet
     beside.collector = std::make_unique<rig::Collector>(rig, std::min(loop.slots, an_hour_of_ticks));
     if (!options.trace.empty()) beside.trace = std::make_unique<rt::Trace>(std::size_t{200'000});
     return beside;
-}
-
-nlohmann::json event_json(const analysis::Change& change) {
-    nlohmann::json event = {{"time_s", change.event.time}};
-    if (!change.device.empty()) event = io::event_json(change.event, change.device, change.members);
-    event["kind"] = change.kind;
-    event["text"] = change.text;
-    return event;
 }
 
 nlohmann::json result_json(const rig::Rig& rig, const rt::LoopReport& report, const analysis::Run& run,
@@ -148,7 +141,7 @@ nlohmann::json result_json(const rig::Rig& rig, const rt::LoopReport& report, co
     result["real_time_factor"] = wall > 0 ? rig.sim_time() / wall : 0;
     result["shifts"] = analysis::to_json(scorecard);
     result["events"] = nlohmann::json::array();
-    for (const auto& change : run.changes) result["events"].push_back(event_json(change));
+    for (const auto& change : run.changes) result["events"].push_back(analysis::to_json(change));
     result["final"] = nlohmann::json::object();
     for (int i = 0; i < rig.signals().size(); ++i)
         result["final"][io::column_name(rig.signals().signal(i))] = rig.value(i);
@@ -224,6 +217,18 @@ bool finish(const RunOptions& options, Beside& beside) {
     return whole;
 }
 
+// False, and told, if it could not be written or the run was stopped before its time.
+bool write_snapshot(const rig::SnapshotTaker& taker, const std::string& path, const rig::Rig& rig,
+                    const rt::LoopSettings& loop, const analysis::Run& run) {
+    try {
+        taker.write(path, rig, loop, run);
+        return true;
+    } catch (const io::RecordingError& error) {
+        std::cerr << error.what() << '\n';
+        return false;
+    }
+}
+
 double dissipated(const rig::Rig& rig) {  // since the machine's start [J]
     return rig.value(rig.signals().find("energy.dissipated"));
 }
@@ -258,7 +263,10 @@ int run(const RunOptions& options) {
     rt::LoopSettings loop = options.loop(rig.setup());
     loop.slots -= rig.ticks();  // a snapshot has done some
     std::optional<rig::SnapshotTaker> taker;
-    if (options.snapshot_at.first >= 0) taker.emplace(rig, options.snapshot_at.first);
+    if (options.snapshot_at.first >= 0) {
+        check_snapshot_time(options.snapshot_at.first, rig, loop.slots);
+        taker.emplace(rig, options.snapshot_at.first);
+    }
     Beside beside = prepare(options, rig, loop);
     LiveLine live(rig);
 
@@ -283,14 +291,15 @@ int run(const RunOptions& options) {
         const SignalsStop signals_stop(session.control());
         if (const auto command = rig::controller_command(options.choices); !command.empty()) {
             controller.emplace(command);
-            get_ready(options, session.control());
+            if (!get_ready(options, session.control(), *controller)) return bad_input;
         }
         run_loop(session, options, live, controller ? &*controller : nullptr, unanswered);
     }
+    const bool controlled = !controller || !controller->was_no_program();
     controller.reset();
 
     const bool frames_logged = rig.buses().end_logs();
-    const bool whole = finish(options, beside) && frames_logged;
+    bool whole = finish(options, beside) && frames_logged && controlled;
     for (const auto& refusal : refusals)
         std::cerr << "this machine does not grant " << rt::to_string(refusal) << '\n';
     for (const auto& line : rig.buses().summary()) std::cerr << line << '\n';
@@ -302,7 +311,7 @@ int run(const RunOptions& options) {
 
     const auto& report = session.report();
     const analysis::Run collected = beside.collector->finish(rig);
-    if (taker) taker->write(options.snapshot_at.second, rig, loop, collected);
+    if (taker) whole = write_snapshot(*taker, options.snapshot_at.second, rig, loop, collected) && whole;
     const auto scorecard = analysis::score(collected);
     if (options.json) {
         nlohmann::json result = result_json(rig, report, collected, scorecard);
@@ -320,23 +329,28 @@ int run(const RunOptions& options) {
 Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<RunOptions>();
     options->add_to(app);
-    app.add_option("--record", options->record, "recording (an LCM log; .zst compresses)");
-    app.add_option("--csv", options->csv, "every signal of every tick");
-    app.add_option("--snapshot-at", options->snapshot_at, "copy the rig at this time [s] into this file")
-        ->check(obeys({0, longest_s}, false).application_index(0));
-    app.add_option(
+    Files& files = options->files;
+    files.written(app.add_option("--record", options->record, "recording (an LCM log; .zst compresses)"));
+    files.written(app.add_option("--csv", options->csv, "every signal of every tick"));
+    auto* snapshot =
+        app.add_option("--snapshot-at", options->snapshot_at, "copy the rig at this time [s] into this file");
+    snapshot->check(obeys({0, longest_s}, false).application_index(0));
+    files.written(snapshot, StandardOutput::no, 1);
+    files.read(app.add_option(
         "--from", options->from,
         "go on from a snapshot: its model, scenario, ticks, kernel, buses and controller; --duration "
-        "counts from the start of its run");
-    app.add_option("--can-log", options->choices.can_log, "candump log of everything on the first CAN bus");
-    app.add_option("--can-replay", options->choices.can_replay,
-                   "candump log that takes the controller's place, at its own times");
-    app.add_option("--trace", options->trace, "what the loop did when, for ui.perfetto.dev");
+        "counts from the start of its run"));
+    files.written(app.add_option("--can-log", options->choices.can_log,
+                                 "candump log of everything on the first CAN bus"));
+    files.read(app.add_option("--can-replay", options->choices.can_replay,
+                              "candump log that takes the controller's place, at its own times"));
+    files.written(app.add_option("--trace", options->trace, "what the loop did when, for ui.perfetto.dev"));
     add_number(app, "--controller-start", options->controller_start_s, {0, 3600},
                "seconds a command given as --controller has to get ready")
         ->capture_default_str();
     app.add_flag("--json", options->json, "end with one JSON object on standard output");
     return [options, &app] {
+        options->files.check();
         if (!options->from.empty()) refuse_what_a_snapshot_settles(app, options->choices);
         // Its frames still to come are no part of the assembly.
         if (options->snapshot_at.first >= 0 && !options->choices.can_replay.empty())

@@ -4,11 +4,13 @@
 #include <memory>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include "apps/serve/dashboard.h"
 #include "apps/shiftrig/arguments.h"
 #include "apps/shiftrig/child.h"
 #include "apps/shiftrig/command.h"
+#include "apps/shiftrig/ending_signals.h"
 #include "apps/shiftrig/loop_report.h"
 #include "apps/shiftrig/rig_options.h"
 
@@ -21,21 +23,20 @@ struct Options : RigOptions {
     std::string record;
 };
 
-sigset_t ending_signals() {
-    sigset_t ends;
-    sigemptyset(&ends);
-    sigaddset(&ends, SIGINT);
-    sigaddset(&ends, SIGTERM);
-    return ends;
+sigset_t set_of(const std::vector<int>& signals) {
+    sigset_t set;
+    sigemptyset(&set);
+    for (const int signal : signals) sigaddset(&set, signal);
+    return set;
 }
 
-// SIGINT and SIGTERM, blocked everywhere else, are waited for by a thread of their own, so that ending needs nothing
+// The ending signals, blocked everywhere else, are waited for by a thread of their own, so that ending needs nothing
 // signal-safe.
 class SignalsStop {
   public:
     explicit SignalsStop(serve::Dashboard& dashboard)
         : thread_([&dashboard] {
-              const sigset_t ends = ending_signals();
+              const sigset_t ends = set_of(ending_signals());
               int which = 0;
               sigwait(&ends, &which);
               dashboard.stop();
@@ -50,14 +51,16 @@ class SignalsStop {
 };
 
 int run(const Options& options) {
-    const sigset_t ends = ending_signals();
+    const sigset_t ends = set_of(ending_signals());
     pthread_sigmask(SIG_BLOCK, &ends, nullptr);
 
     rig::Choices choices = options.choices;
     choices.lockstep = options.pacing() == rt::Pace::lockstep;
-    rig::Rig rig(rig::make_setup(choices));
+    rig::Setup setup = rig::make_setup(choices);
+    options.check_files(setup);
+    rig::Rig rig(std::move(setup));
     for (const auto& warning : rig.buses().warnings()) std::cerr << warning << '\n';
-    pthread_sigmask(SIG_UNBLOCK, &ends, nullptr);  // nothing is lost yet: either signal may end it as usual
+    pthread_sigmask(SIG_UNBLOCK, &ends, nullptr);  // nothing is lost yet: a signal may end it as usual
     rehearse(options, rig);
     pthread_sigmask(SIG_BLOCK, &ends, nullptr);
 
@@ -99,11 +102,14 @@ Command::Run declare(CLI::App& app) {
         ->capture_default_str();
     add_number(app, "--port", options->http.port, {0, 65535}, "0: any free one")->capture_default_str();
     app.add_option("--token", options->http.token, "that every request must carry (?token=…)");
-    app.add_option(
+    options->files.written(app.add_option(
         "--record", options->record,
         "record from the start, to this file; after a change from the page the next ones go to FILE-2, "
-        "FILE-3, …");
-    return [options] { return run(*options); };
+        "FILE-3, …"));
+    return [options] {
+        options->files.check();
+        return run(*options);
+    };
 }
 
 const Command command("serve", "the rig with its live dashboard on 127.0.0.1", declare);

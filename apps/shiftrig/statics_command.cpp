@@ -125,7 +125,7 @@ int run(const Options& options) {
     io::ModelFile file = io::read_model(options.model);
     for (const auto& text : options.options) {
         const auto [gear, option] = named_word("--option", text);
-        io::select_option(file.description, gear, option);
+        select_option(file, gear, option);
     }
     plant::StaticsProblem problem;
     problem.closed = options.closed;

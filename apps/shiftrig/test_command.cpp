@@ -40,6 +40,7 @@ struct Options : RigOptions {
 // What a scenario's run came to: its verdict, and the scorecard of every shift.
 struct Outcome : analysis::TestResult {
     nlohmann::json shifts = nlohmann::json::array();
+    std::string outcome;  // of the loop; empty: it did not run
 };
 
 using Clock = std::chrono::steady_clock;
@@ -92,6 +93,10 @@ std::string left_out(const rig::Collector& collector) {
     return "";
 }
 
+std::string recording_of(const Options& options, const std::string& scenario) {
+    return options.record_folder + "/" + scenario + ".lcmlog";
+}
+
 // Longest first: the last to end should be a short one.
 std::vector<std::size_t> by_duration(const std::vector<Case>& cases) {
     const auto duration = [&](std::size_t i) { return cases[i].scenario ? cases[i].scenario->duration : 0; };
@@ -128,7 +133,7 @@ Outcome run_one(const Options& options, const analysis::Limits& limits, const Ca
         session_options.collector = &collector;
         std::optional<io::RecordingWriter> recording;
         if (!options.record_folder.empty()) {
-            recording.emplace(options.record_folder + "/" + scenario.name + ".lcmlog");
+            recording.emplace(recording_of(options, scenario.name));
             session_options.recording = &*recording;
         }
         rig::Session session(rig, std::move(session_options));
@@ -136,11 +141,14 @@ Outcome run_one(const Options& options, const analysis::Limits& limits, const Ca
         if (const auto command = rig::controller_command(options.choices); !command.empty())
             controller.emplace(command);
         session.run();
+        if (controller)
+            if (const auto how = controller->ended(); how && controller->was_no_program())
+                result.error = path + ": " + *how;
         result.sim_time_s = rig.sim_time();
+        result.outcome = name(session.report().outcome);
         result.failures = broken_run(path, session);
-        if (const auto missing = left_out(collector); !missing.empty()) {
-            result.error = path + ": " + missing;
-        } else if (result.failures.empty()) {
+        if (const auto missing = left_out(collector); !missing.empty()) result.error = path + ": " + missing;
+        if (result.error.empty() && result.failures.empty()) {
             const analysis::Run run = collector.finish(rig);
             const analysis::Scorecard card = analysis::score(run, limits);
             result.failures = analysis::broken_expectations(scenario, run, card);
@@ -181,6 +189,7 @@ nlohmann::json to_json(const std::vector<Outcome>& results, std::size_t failures
                               {"sim_time_s", result.sim_time_s},
                               {"wall_time_s", result.wall_time_s},
                               {"shifts", result.shifts}};
+        if (!result.outcome.empty()) run["loop"] = {{"outcome", result.outcome}};
         if (!result.error.empty()) run["error"] = result.error;
         runs.push_back(std::move(run));
     }
@@ -188,8 +197,9 @@ nlohmann::json to_json(const std::vector<Outcome>& results, std::size_t failures
 }
 
 // The same file under two spellings is one scenario; recordings are called by the scenario's name alone.
-void refuse_repeated(const Options& options) {
+void check_files(const Options& options) {
     std::map<std::string, std::string> by_place, by_name;
+    std::vector<NamedFile> recordings;
     for (const auto& path : options.scenarios) {
         const auto place = std::filesystem::weakly_canonical(path);
         if (!by_place.emplace(place.string(), path).second)
@@ -198,13 +208,16 @@ void refuse_repeated(const Options& options) {
         if (!is_new && !options.record_folder.empty())
             throw std::invalid_argument("--record: scenarios " + first->second + " and " + path +
                                         " would both be recorded as " + first->first + ".lcmlog");
+        if (!options.record_folder.empty())
+            recordings.push_back({"--record", recording_of(options, place.stem().string())});
     }
+    options.files.check({}, recordings);
 }
 
 int run(const Options& options) {
+    check_files(options);
     const analysis::Limits limits =
         options.limits.empty() ? analysis::default_limits() : analysis::read_limits(options.limits);
-    refuse_repeated(options);
     // A bus outside the process can carry one rig at a time.
     const bool alone = std::any_of(options.choices.buses.begin(), options.choices.buses.end(),
                                    [](const std::string& bus) { return bus != "inprocess"; });
@@ -263,16 +276,18 @@ int run(const Options& options) {
 Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<Options>();
     options->add_common_to(app, "free");
-    app.add_option("SCENARIO", options->scenarios, "scenario files with expectations (YAML)")->required();
-    app.add_option("--junit", options->junit, "results as JUnit XML");
+    Files& files = options->files;
+    files.read(app.add_option("SCENARIO", options->scenarios, "scenario files with expectations (YAML)")
+                   ->required());
+    files.written(app.add_option("--junit", options->junit, "results as JUnit XML"));
     app.add_flag(
         "--json", options->json,
         "one JSON object on standard output, with the scorecard of every shift: for shiftrig compare");
     add_number(app, "--jobs", options->jobs, {1, 1024},
                "scenarios side by side; one at a time on a bus outside the process")
         ->capture_default_str();
-    app.add_option("--limits", options->limits,
-                   "of the scorecard (YAML); else config/limits.yaml as built in");
+    files.read(app.add_option("--limits", options->limits,
+                              "of the scorecard (YAML); else config/limits.yaml as built in"));
     app.add_option("--record", options->record_folder,
                    "keep a recording of every scenario in this folder, called by its name")
         ->check(CLI::ExistingDirectory);

@@ -10,9 +10,11 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 #include <thread>
 
 #include "io/input_error.h"
+#include "io/text_file.h"
 
 namespace shiftrig::io::can {
 
@@ -117,8 +119,7 @@ std::optional<LogEntry> parse_candump_line(std::string_view line, const std::str
 }
 
 std::vector<LogEntry> read_candump(const std::string& path) {
-    std::ifstream in(path);
-    if (!in) throw InputError(path, 0, 0, "cannot be read");
+    std::istringstream in(read_text(path));
     std::vector<LogEntry> entries;
     std::string line;
     for (int number = 1; std::getline(in, line); ++number)

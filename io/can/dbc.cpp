@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <unordered_map>
 
 #include "io/can/dbc_scanner.h"
 #include "io/input_error.h"
+#include "io/text_file.h"
 
 namespace shiftrig::io::can::dbc {
 
@@ -533,11 +532,9 @@ Database parse(std::string_view text, const std::string& file) {
 }
 
 Database read(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    if (!in) throw InputError(path, 0, 0, "cannot be read");
-    std::ostringstream text;
-    text << in.rdbuf();
-    return parse(text.str(), path);
+    Database database = parse(read_text(path), path);
+    if (database.messages.empty()) throw InputError(path, 0, 0, "has no messages; is it a DBC file?");
+    return database;
 }
 
 }  // namespace shiftrig::io::can::dbc

@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <initializer_list>
 #include <iomanip>
@@ -14,6 +13,7 @@
 
 #include "io/can/units.h"
 #include "io/input_error.h"
+#include "io/text_file.h"
 
 namespace shiftrig::io::can {
 
@@ -355,16 +355,14 @@ bool Mapping::sent_by_rig(const dbc::Message& message) const noexcept {
 }
 
 Mapping read_mapping(const std::string& path) {
-    std::ifstream in(path);
-    if (!in) throw InputError(path, 0, 0, "cannot be read");
-    std::ostringstream text;
-    text << in.rdbuf();
+    const std::string text = read_text(path);
     YAML::Node node;
     try {
-        node = YAML::Load(text.str());
+        node = YAML::Load(text);
     } catch (const YAML::Exception& error) {
         throw InputError(path, error.mark.line + 1, error.mark.column + 1, error.msg);
     }
+    if (node.IsNull()) throw InputError(path, 1, 1, "the file is empty");
     return Reader(path).mapping(node);
 }
 

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
+#include <set>
+#include <sstream>
 
 #include "io/input_error.h"
 #include "io/signals.h"
+#include "io/text_file.h"
 #include "io/units.h"
 
 namespace shiftrig::io {
@@ -76,9 +78,9 @@ FieldColumn field_column(const std::string& written) {
 }
 
 FieldRecording read_field_csv(const std::string& path) {
-    std::ifstream file(path);
+    std::istringstream file(read_text(path));
     std::string line;
-    if (!file || !std::getline(file, line)) throw InputError(path, 0, 0, "cannot be read, or is empty");
+    if (!std::getline(file, line)) throw InputError(path, 0, 0, "is empty");
     const char separator = line.find(';') != std::string::npos    ? ';'
                            : line.find('\t') != std::string::npos ? '\t'
                                                                   : ',';
@@ -136,7 +138,12 @@ FieldFit replay_field(const FieldRecording& recording, const plant::Model& model
     plant::Start start;
     start.locked = locked;
     std::vector<std::pair<std::string, double>> measured_speeds;
+    std::set<std::string> seen;
     for (const auto& column : recording.columns) {
+        const bool known = model.input(column.signal) >= 0 || model.output(column.signal) >= 0;
+        if (known && !seen.insert(column.signal).second)
+            throw InputError(recording.path, 1, 0,
+                             column.written + ": a column before it is of the same signal");
         if (const int input = model.input(column.signal); input >= 0) {
             const plant::Signal& signal = *signal_named(model.inputs(), column.signal);
             check_unit(recording, column, signal);
@@ -190,6 +197,10 @@ FieldFit replay_field(const FieldRecording& recording, const plant::Model& model
     // Rows that fall into a step are held against its two ends, interpolated.
     const double begin = recording.time.front(), h = model.step_size();
     const auto steps = static_cast<std::int64_t>(std::floor((recording.time.back() - begin) / h + 0.5));
+    if (steps < 1)
+        throw InputError(recording.path, 0, 0,
+                         "lasts " + in_digits(recording.time.back() - begin) +
+                             " s, less than half a step of " + in_digits(h) + " s: nothing can be compared");
     plant::observe(model, operators, state, inputs, outputs, scratch);
     std::vector<double> before = outputs.value;
     std::size_t row = 0;

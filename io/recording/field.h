@@ -54,7 +54,8 @@ struct FieldFit {
 // Steps the plant from the first to the last row. It starts with `locked` devices locked and the masses at their
 // measured speeds (`mass.<m>.speed`, or a sensor's). Inputs with a unit are interpolated between rows, those without
 // (commands 0…1, flags) are held; values beyond an input's range are limited and counted. Throws InputError
-// where a column of one of the model's signals is not written in that signal's unit.
+// where a column of one of the model's signals is not written in that signal's unit, where two are of one signal, and
+// where the recording lasts less than half a step.
 FieldFit replay_field(const FieldRecording& recording, const plant::Model& model,
                       const std::vector<std::string>& locked);
 

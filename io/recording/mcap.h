@@ -11,7 +11,7 @@
 
 namespace shiftrig::io {
 
-// Returns the number of ticks written. Throws RecordingError if the file cannot be written.
+// Returns the number of ticks written; "-" is standard output. Throws RecordingError if the file cannot be written.
 std::int64_t export_mcap(RecordingReader& reader, const std::string& path);
 
 }  // namespace shiftrig::io

@@ -67,7 +67,7 @@ std::uint32_t crc_of(std::string_view bytes, std::uint32_t start = 0) {
 }  // namespace
 
 McapFile::McapFile(const std::string& path, const std::string& library)
-    : path_(path), file_(std::fopen(path.c_str(), "wbe")) {
+    : path_(path), file_(path == "-" ? stdout : std::fopen(path.c_str(), "wbe")) {
     if (!file_) throw RecordingError(path + ": cannot be written: " + std::strerror(errno));
     put(magic);
     std::string content, bytes;
@@ -78,7 +78,7 @@ McapFile::McapFile(const std::string& path, const std::string& library)
 }
 
 McapFile::~McapFile() {
-    if (file_) std::fclose(file_);
+    if (file_ && file_ != stdout) std::fclose(file_);
 }
 
 void McapFile::put(std::string_view bytes) {
@@ -254,7 +254,7 @@ void McapFile::close() {
     put(section);
     put(tail);
     put(magic);
-    failed_ |= std::fclose(file_) != 0;
+    failed_ |= (file_ == stdout ? std::fflush(file_) : std::fclose(file_)) != 0;
     file_ = nullptr;
     if (failed_) throw RecordingError(path_ + ": cannot be written: " + std::strerror(errno));
 }

@@ -14,7 +14,8 @@ namespace shiftrig::io {
 
 class McapFile {
   public:
-    McapFile(const std::string& path, const std::string& library);  // throws RecordingError
+    // "-" is standard output. Throws RecordingError.
+    McapFile(const std::string& path, const std::string& library);
     ~McapFile();
     McapFile(const McapFile&) = delete;
     McapFile& operator=(const McapFile&) = delete;

@@ -320,6 +320,9 @@ bool RecordingReader::Implementation::next(RecordedTick& tick) {
                 return damaged("its closing record counts " + std::to_string(end.ticks) + " ticks and " +
                                std::to_string(end.lost) + " lost");
             lost_at_end = end.lost - lost;
+            const bool more = source.next(event);
+            if (more || !source.error().empty())
+                return stop(Ending::damaged, "goes on behind its closing record, with what is no part of it");
             return stop(Ending::complete, "");
         } else {
             return damaged("unknown channel " + printable(event.channel));

@@ -1,5 +1,8 @@
 #include "io/recording/rebuild.h"
 
+#include <algorithm>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace shiftrig::io {
@@ -25,16 +28,25 @@ void require_same(const char* what, const std::vector<plant::Signal>& recorded,
                                  name(built, i) + " here");
 }
 
+// In another model than the recorded one they may be missing.
+void use_recorded_options(ModelFile& file, const Manifest& manifest) {
+    try {
+        for (const auto& [gear, option] : manifest.overrides) select_option(file.description, gear, option);
+    } catch (const std::invalid_argument& error) {
+        throw InputError(file.path, 0, 0, std::string(error.what()) + ", which the recorded run has in use");
+    }
+}
+
 }  // namespace
 
 ModelFile recorded_model_file(const Manifest& manifest) {
     ModelFile file = parse_model(manifest.model_text, manifest.model_path);
-    for (const auto& [gear, option] : manifest.overrides) select_option(file.description, gear, option);
+    use_recorded_options(file, manifest);
     return file;
 }
 
 plant::Model build_as_recorded(ModelFile& file, const Manifest& manifest) {
-    for (const auto& [gear, option] : manifest.overrides) select_option(file.description, gear, option);
+    use_recorded_options(file, manifest);
     plant::BuildOptions options;
     options.step_size = manifest.step_size;
     options.kernel = kernel_of(manifest.kernel);

@@ -197,6 +197,20 @@ TEST_F(ResultFiles, ThatAreIllTypedAreNamedWithFileRunShiftKeyAndRule) {
     EXPECT_EQ(refused(R"({"from": "F3", "to": "F4", "clutch_energy_j": {"F3": null}})"), "accepted");
 }
 
+TEST_F(ResultFiles, OfARunThatIsNotWholeAreRefusedInOneLine) {
+    const auto refused = [this](const std::string& more) {
+        return refusal(file("r.json", "{\"shifts\": [], " + more + "}"));
+    };
+    for (const char* outcome : {"stopped", "too_far_behind", "late_too_often"})
+        EXPECT_EQ(refused(R"("loop": {"outcome": ")" + std::string(outcome) + "\"}"),
+                  "r.json: run \"r\" did not come to its end (outcome \"" + std::string(outcome) +
+                      "\"); only whole runs are compared");
+    EXPECT_EQ(refused(R"("loop": {"outcome": "completed"})"), "accepted");
+    EXPECT_EQ(refused(R"("loop": {"ticks": 3})"), "accepted");
+    EXPECT_EQ(refused(R"("error": "r.yaml: cannot be read")"),
+              "r.json: run \"r\" could not be judged: r.yaml: cannot be read");
+}
+
 TEST_F(ResultFiles, WrongOnesAreRefusedInOneLine) {
     EXPECT_EQ(refusal((folder / "none").string()), "none: no such file");
     EXPECT_EQ(refusal(file("broken.json", "{\"shifts\": [")), "broken.json: neither a recording nor JSON");

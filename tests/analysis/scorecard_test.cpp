@@ -113,8 +113,18 @@ TEST(Limits, WrongOnesAreRefusedWithTheirPlace) {
     EXPECT_EQ(refusal("launching: {}\n"), "limits.yaml:1:12: unknown key \"launching\"");
     EXPECT_EQ(refusal("shift: {duration_s: {good: .nan, reject: 2}}"),
               "limits.yaml:1:28: shift: duration_s: good = .nan; must be a number ≥ 0");
+    EXPECT_EQ(refusal("# nothing\n"), "limits.yaml:1:1: the file is empty");
     EXPECT_EQ(refusal("rules: {timeout_s: 3}\n"), "accepted");
     EXPECT_EQ(parse_limits("rules: {timeout_s: 3}\n", "").rules.timeout, 3);
+}
+
+TEST(Limits, AFolderIsToldSo) {
+    try {
+        read_limits("/tmp");
+        FAIL();
+    } catch (const io::InputError& error) {
+        EXPECT_STREQ(error.what(), "/tmp: cannot be read: Is a directory");
+    }
 }
 
 }  // namespace

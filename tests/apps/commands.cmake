@@ -18,6 +18,11 @@ target_compile_definitions(article_test PRIVATE SHIFTRIG_SOURCE_DIR="${CMAKE_SOU
 target_link_libraries(article_test PRIVATE shiftrig_rig GTest::gtest_main)
 gtest_discover_tests(article_test)
 
+# What the commands do with the files they are given, and with those that are not whole.
+add_test(NAME files_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/files_test.py $<TARGET_FILE:shiftrig> ${CMAKE_SOURCE_DIR}/config)
+
+add_test(NAME json_docs_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/json_docs_test.py $<TARGET_FILE:shiftrig> ${CMAKE_SOURCE_DIR})
+
 if(SHIFTRIG_BENCH)
   set(SOAK $<TARGET_FILE:shiftrig_soak>)
 endif()

@@ -402,12 +402,12 @@ TEST(Rig, LeverBetweenTwoGearsIsRefused) {
 
 TEST(Rig, StartThatTheMachineCannotHaveIsRefusedWithItsPlace) {
     EXPECT_EQ(refusal_of("duration_s: 1\nstart:\n  locked: [Fc, F9]\n"),
-              "5: start \"F9\": locked is no clutch, brake or freewheel of the model");
+              "5:3: start \"F9\": locked is no clutch, brake or freewheel of the model");
     EXPECT_EQ(refusal_of("duration_s: 1\nstart:\n  options: {range: Q}\n"),
-              "5: gear \"range\": no option \"Q\"; there are L, M, H");
+              "5:3: gear \"range\": no option \"Q\"; there are L, M, H");
     EXPECT_EQ(refusal_of("duration_s: 1\nstart:\n  locked: [Fc]\n  speeds:\n    engine_rpm: 1800\n"
                          "    clutch_disc_rpm: 900\n"),
-              "7: start \"engine\": speeds contradicts the other speeds through gears and locked devices");
+              "7:5: start \"engine\": speeds contradicts the other speeds through gears and locked devices");
 }
 
 }  // namespace

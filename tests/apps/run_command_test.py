@@ -166,6 +166,50 @@ class BadInput(InAFolder):
         for option in (("--hold", "environment.draft=1"), ("--locked", "Fc"), ("--step", "0.1")):
             self.assert_one_line(command("replay", recording, *option), option[0] + ": only of field recordings")
 
+    def test_a_scenarios_missing_model_is_told_with_the_place_that_names_it(self):
+        scenario = self.path("s.yaml")
+        with open(scenario, "w") as file:
+            file.write("about: none\nmodel: nosuch.yaml\nduration_s: 1\n")
+        self.assert_one_line(run("--scenario", scenario), "^" + re.escape(
+            scenario + ":2:1: model: " + self.path("nosuch.yaml") + ": cannot be read: No such file or directory") + "$")
+
+    def test_a_gear_option_that_the_machine_does_not_have_is_told_with_its_place(self):
+        recording, scenario = self.path("u.lcmlog"), self.path("s.yaml")
+        two_masses = CONFIG + "/two_mass.yaml"
+        with open(scenario, "w") as file:
+            file.write("model: " + two_masses + "\nduration_s: 1\nstart:\n  options: {range: M}\n")
+        self.assert_one_line(run("--scenario", scenario), re.escape(scenario) + ':4:3: no gear "range" with options$')
+        free("--duration", "0.1", "--record", recording)
+        self.assert_one_line(command("replay", recording, "--model", two_masses),
+                             re.escape(two_masses) + ': no gear "range" with options, which the recorded run has in use$')
+        field = self.path("f.csv")
+        with open(field, "w") as file:
+            file.write("time_s,mass.engine.speed_rpm\n0,1000\n0.05,1000\n")
+        self.assert_one_line(command("replay", field, "--model", two_masses, "--option", "range=M"),
+                             "^--option range=M: " + re.escape(two_masses) + ': no gear "range" with options$')
+
+    def test_a_log_and_a_controller_do_not_both_drive(self):
+        log = self.path("shift.log")
+        free("--can-log", log, "--duration", "0.5")
+        for controller in ("builtin", "sleep 10"):
+            self.assert_one_line(run("--scenario", SHIFT, "--can-replay", log, "--controller", controller),
+                                 "--can-replay and --controller " + controller + " exclude each other: the log takes the controller's place$")
+        free("--can-replay", log, "--controller", "none")
+
+    def test_nothing_is_varied_twice_and_hints_have_units(self):
+        snapshot = self.path("s.snap")
+        free("--snapshot-at", "2.14", snapshot)
+        for variations, pattern in (
+                (("clutch.F3.leak=0,0.1", "clutch.F3.leak=0.2"), r"--vary clutch\.F3\.leak: is varied already$"),
+                (("environment.oil_temperature_degc=50", "environment.grade_percent=1", "environment.grade=0.1"),
+                 r"--vary environment\.grade: is varied already, as environment\.grade_percent$"),
+                (("calibration.shift.inertia_time_s=0.1",) * 2, r"--vary calibration\.shift\.inertia_time_s: is varied already$"),
+                (("model.masses.vehicle.mass_kg=7000",) * 2, r"--vary model\.masses\.vehicle\.mass_kg: is varied already$"),
+                (("environment.oil_temperature=90",),
+                 r"--vary environment\.oil_temperature: must be written with its unit: environment\.oil_temperature ends in _degc$"),
+                (("environment.oil_temprature_degc=90",), r"nearest: environment\.oil_temperature_degc, ")):
+            self.assert_one_line(command("fork", snapshot, *(word for each in variations for word in ("--vary", each))), pattern)
+
     def test_recording_that_cannot_be_written(self):
         self.assert_one_line(run("--scenario", SHIFT, "--record", "/nosuch/dir/x.lcmlog"), "/nosuch/dir/x.lcmlog")
 
@@ -360,6 +404,31 @@ class Results(InAFolder):
             self.assertGreaterEqual(span["dur"], 0)
         self.assertEqual([e["args"]["slot"] for e in spans if e["name"] == "tick"], list(range(ticks)))
 
+    def test_every_event_has_its_time_kind_device_and_words_whoever_tells_it(self):
+        recording = self.path("shift.lcmlog")
+        told = {"run": free("--record", recording, "--duration", "3")["events"],
+                "explain": json.loads(command("explain", recording, "--json").stdout)}
+        for who, events in told.items():
+            for event in events:
+                self.assertLessEqual({"time_s", "kind", "device", "text"}, event.keys(), (who, event))
+            self.assertIn(("message_status", ""), {(e["kind"], e["device"]) for e in events}, who)
+        of_machine = {who: [e for e in events if e["device"]] for who, events in told.items()}
+        self.assertGreater(len(of_machine["run"]), 3)
+        self.assertEqual(of_machine["run"], of_machine["explain"])
+
+    def test_what_the_solver_says_of_itself_is_no_difference_of_machines(self):
+        recording = self.path("shift.lcmlog")
+        free("--record", recording)
+        heavier, _ = self.tractor_with("vehicle:      {mass_kg: 14000", "vehicle:      {mass_kg: 14100")
+        table = command("replay", recording, "--model", heavier)
+        self.assertEqual(table.returncode, 0, table.stderr)
+        signals = [line.split()[0] for line in table.stdout.splitlines()[1:]]
+        deviations = [d["signal"] for d in json.loads(command("replay", recording, "--model", heavier, "--json").stdout)["deviations"]]
+        self.assertIn("mass.vehicle.speed_m_s", signals)
+        self.assertIn("energy.stored_j", deviations)
+        for signal_name in signals + deviations:
+            self.assertFalse(signal_name.startswith(("certificate.", "energy.defect")), signal_name)
+
     def test_a_recording_is_judged_as_its_run_was(self):
         recording = self.path("shift.lcmlog")
         judged = free("--record", recording)["shifts"]
@@ -396,8 +465,8 @@ class Results(InAFolder):
         self.assertEqual(replayed.returncode, 0)
         self.assertEqual(json.loads(replayed.stdout)["ticks"], result["ticks"])
 
-    def stopped(self, *arguments, after):
-        """SIGTERM once `after()` holds; the result, and the seconds that the program still took."""
+    def stopped(self, *arguments, after, by=signal.SIGTERM):
+        """The signal once `after()` holds; the result, and the seconds that the program still took."""
         process = subprocess.Popen([MULTICAST, SHIFTRIG, "run", "--scenario", SHIFT, "--json", *arguments],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.addCleanup(process.kill)
@@ -406,7 +475,7 @@ class Results(InAFolder):
             time.sleep(0.05)
         time.sleep(0.5)
         asked = time.monotonic()
-        process.send_signal(signal.SIGTERM)
+        process.send_signal(by)
         out, err = process.communicate(timeout=60)
         took = time.monotonic() - asked
         self.assertEqual(process.returncode, 0, err)
@@ -431,6 +500,36 @@ class Results(InAFolder):
                 self.assertEqual(replayed.returncode, 0)
                 self.assertEqual(json.loads(replayed.stdout)["ticks"], result["ticks"])
                 os.remove(recording)
+
+    def test_the_end_of_the_terminal_ends_a_run_with_everything_kept(self):
+        recording, table = self.path("cut.lcmlog"), self.path("cut.csv")
+        recorded = lambda: os.path.exists(recording) and os.path.getsize(recording) > 200000
+        result, _ = self.stopped("--factor", "0.1", "--record", recording, "--csv", table, after=recorded, by=signal.SIGHUP)
+        with open(table) as file:
+            self.assertEqual(len(file.readlines()), 1 + result["ticks"])
+        replayed = command("replay", recording, "--json")
+        self.assertEqual((replayed.returncode, json.loads(replayed.stdout)["ticks"]), (0, result["ticks"]))
+
+    def test_nohup_outlives_the_terminal(self):
+        recording = self.path("whole.lcmlog")
+        process = subprocess.Popen(["nohup", SHIFTRIG, "run", "--scenario", SHIFT, "--factor", "4", "--json", "--record", recording],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while not os.path.exists(recording) or os.path.getsize(recording) < 200000:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGHUP)
+        out, err = process.communicate(timeout=60)
+        self.assertEqual((process.returncode, json.loads(out.splitlines()[-1])["loop"]["outcome"]), (0, "completed"), err)
+
+    def test_a_controller_that_is_no_program_ends_the_run_before_it_begins(self):
+        began = time.monotonic()
+        done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "nixprog --now", "--controller-start", "60", "--json")
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertEqual(done.stderr.splitlines()[-1], 'controller "nixprog --now" could not be started (status 127)')
+        self.assertLess(time.monotonic() - began, 30)
+        done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "nixprog", "--controller-start", "0", "--json", "--factor", "4")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn('controller "nixprog" could not be started (status 127)', done.stderr.splitlines())
+        self.assertEqual(json.loads(done.stdout)["ticks"], 6000)
 
     def test_controller_that_ends_is_told_and_the_safe_command_acts(self):
         done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "exit 3", "--pace", "wall", "--factor", "4",

@@ -60,6 +60,13 @@ class Serve(Folder):
         while not (os.path.exists(path) and os.path.getsize(path) > 500_000) and time.time() < until:
             time.sleep(0.02)
 
+    def test_the_end_of_the_terminal_ends_it_with_its_recording_kept(self):
+        rig = Served(TRACTOR, "--record", self.path("x.lcmlog"))
+        self.await_ticks("x.lcmlog")
+        status, _, err = rig.end(signal.SIGHUP)
+        self.assertEqual(status, 0, err)
+        self.assertGreater(self.assert_sound(self.path("x.lcmlog")), 0)
+
     def test_a_refused_parameter_is_told_to_who_asked_and_leaves_the_recording_as_it_was(self):
         rig = Served(TRACTOR, "--record", self.path("x.lcmlog"))
         status, text = rig.post("parameter", name=CAPACITY, value=-1)

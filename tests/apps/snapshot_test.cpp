@@ -253,8 +253,8 @@ TEST(Fork, UnknownNameIsToldWithItsNeighbours) {
         FAIL();
     } catch (const io::InputError& error) {
         EXPECT_TRUE(std::string(error.what())
-                        .starts_with("--vary clutch.F3.leek: no such signal, or without its unit's suffix; "
-                                     "near: clutch.F3.leak"))
+                        .starts_with("--vary clutch.F3.leek: no such signal, or not with its unit's suffix; "
+                                     "nearest: clutch.F3.leak"))
             << error.what();
     }
 }

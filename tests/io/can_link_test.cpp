@@ -462,6 +462,27 @@ class Configuration : public testing::Test {
     std::filesystem::path folder_;
 };
 
+TEST_F(Configuration, AFolderOrAnEmptyFileIsNoDbcAndNoMapping) {
+    const auto refusal = [this](const auto& read_one, const std::string& name) {
+        try {
+            read_one((folder_ / name).string());
+        } catch (const InputError& error) {
+            return std::string(error.what()).substr(folder_.string().size());
+        }
+        return std::string("accepted");
+    };
+    std::filesystem::create_directory(folder_ / "folder");
+    std::ofstream(folder_ / "empty") << "";
+    EXPECT_EQ(refusal(dbc::read, "folder"), "/folder: cannot be read: Is a directory");
+    EXPECT_EQ(refusal(dbc::read, "empty"), "/empty: has no messages; is it a DBC file?");
+    EXPECT_EQ(refusal(dbc::read, "none"), "/none: cannot be read: No such file or directory");
+    EXPECT_EQ(refusal(read_mapping, "folder"), "/folder: cannot be read: Is a directory");
+    EXPECT_EQ(refusal(read_mapping, "empty"), "/empty:1:1: the file is empty");
+    // By way of a mapping, too.
+    std::ofstream(folder_ / "mapping.yaml") << "dbc: folder\nrig_nodes: [Rig]\nmessages: {}\n";
+    EXPECT_EQ(refusal(read_mapping, "mapping.yaml"), "/folder: cannot be read: Is a directory");
+}
+
 TEST_F(Configuration, ElevenBitControllersWithMotorolaCrcAndMultiplexingWork) {
     const Mapping mapping = read(
         "  Command:\n    command: true\n    counter: {signal: Count, modulo: 256}\n"

@@ -204,6 +204,28 @@ TEST(ModelFile, AWrongValueIsNamedWithPlaceDeviceKeyValueAndRule) {
               "m.yaml:6:26: gear \"g\": ratio = 0; must not be 0");
 }
 
+TEST(ModelFile, NoNumberIsInfinite) {
+    EXPECT_EQ(refusal(replaced(two_masses, "inertia_kg_m2: 1}", "inertia_kg_m2: .inf}")),
+              "m.yaml:3:10: mass \"left\": inertia_kg_m2 = .inf; must be a finite number");
+    EXPECT_EQ(refusal(replaced(two_masses, "inertia_kg_m2: 1}", "inertia_kg_m2: -.inf}")),
+              "m.yaml:3:10: mass \"left\": inertia_kg_m2 = -.inf; must be a finite number");
+}
+
+TEST(ModelFile, NoMassIsCalledAsTheHousing) {
+    EXPECT_EQ(
+        refusal(replaced(two_masses, "  left:", "  housing:")),
+        "m.yaml:3:3: mass \"housing\": the word stands for the fixed housing, and can be no mass's name");
+    EXPECT_EQ(refusal(two_masses + "dampers:\n  housing: {a: left, b: housing, damping_nm_s_per_rad: 1}\n"),
+              "");
+}
+
+TEST(ModelFile, ALineBreakInANameLeavesTheRefusalOneLine) {
+    EXPECT_EQ(refusal(two_masses + "\"two\\nlines\": 1\n"),
+              "m.yaml:5:1: two\\nlines is not a known key; nearest: engines");
+    EXPECT_EQ(refusal(two_masses + "input_mass: \"a\\tb\\e[2Jc\"\n"),
+              "m.yaml:5:1: input_mass = a\\tb\\x1b[2Jc; must name a mass; nearest: left");
+}
+
 TEST(ModelFile, AMisspeltKeyIsNamedWithItsNeighbour) {
     EXPECT_EQ(
         refusal(replaced(two_masses, "inertia_kg_m2: 2}", "inertia_kg_m2: 2, inital_speed_rad_s: 3}")),

@@ -283,6 +283,19 @@ TEST(WrongRecording, WithoutItsClosingRecord) {
     EXPECT_EQ(complaint_about(file.path), file.path + ": is cut short after tick 4, within a record");
 }
 
+TEST(WrongRecording, GoingOnBehindItsClosingRecord) {
+    for (const char* ending : {".lcmlog", ".lcmlog.zst"}) {
+        TemporaryFile file(ending);
+        write(file.path, 5);
+        const std::string bytes = read_file(file.path);
+        for (const std::string& more : {bytes, std::string("x"), std::string(100, '\0')}) {
+            write_file(file.path, bytes + more);
+            EXPECT_EQ(complaint_about(file.path),
+                      file.path + ": goes on behind its closing record, with what is no part of it");
+        }
+    }
+}
+
 TEST(WrongRecording, CutAnywhereItGivesOneLineAndOnlySoundTicks) {
     TemporaryFile file(".lcmlog"), cut(".lcmlog");
     write(file.path, 8);

@@ -293,6 +293,7 @@ TEST(FieldReplay, WrongDataIsNamedWithItsLine) {
     EXPECT_EQ(error("time_s,a\n0,1\n0.1,x\n"), ":3: a = \"x\"; must be a number");
     EXPECT_EQ(error("time_s,a\n0,1\n0,1\n"), ":3:1: time_s = 0; must be later than the row before");
     EXPECT_EQ(error("time_s,a\n0,1\n"), ": has fewer than two rows");
+    EXPECT_EQ(error(""), ": is empty");
 }
 
 TEST(FieldReplay, AColumnInAnotherUnitIsRefused) {
@@ -323,6 +324,43 @@ TEST(FieldReplay, AColumnInAnotherUnitIsRefused) {
     EXPECT_EQ(
         error("driver.throttle,mass.engine.speed"),
         ":1: mass.engine.speed must be written with its unit: mass.engine.speed ends in _rad_s or _rpm");
+}
+
+TEST(FieldReplay, ARecordingShorterThanHalfAStepFitsNothing) {
+    TemporaryFile field(".csv");
+    plant::BuildOptions options;
+    options.step_size = 0.05;
+    const plant::Model model = build_model(read_model(SHIFTRIG_SOURCE_DIR "/config/two_mass.yaml"), options);
+    const auto error = [&](const std::string& end) {
+        write_file(field.path, "time_s,mass.engine.speed_rad_s\n0,100\n" + end + ",100\n");
+        try {
+            replay_field(read_field_csv(field.path), model, {});
+        } catch (const InputError& e) {
+            return std::string(e.what()).substr(field.path.size());
+        }
+        return std::string("(no error)");
+    };
+    EXPECT_EQ(error("0.02"), ": lasts 0.02 s, less than half a step of 0.05 s: nothing can be compared");
+    EXPECT_EQ(error("0.03"), "(no error)");
+}
+
+TEST(FieldReplay, NoTwoColumnsAreOfOneSignal) {
+    TemporaryFile field(".csv");
+    const plant::Model model = build_model(read_model(SHIFTRIG_SOURCE_DIR "/config/tractor.yaml"));
+    const auto error = [&](const std::string& columns) {
+        write_file(field.path, "time_s,mass.engine.speed_rpm," + columns + "\n0,1,1,1\n0.01,1,1,1\n");
+        try {
+            replay_field(read_field_csv(field.path), model, {});
+        } catch (const InputError& e) {
+            return std::string(e.what()).substr(field.path.size());
+        }
+        return std::string("(no error)");
+    };
+    EXPECT_EQ(error("driver.throttle,driver.throttle"),
+              ":1: driver.throttle: a column before it is of the same signal");
+    EXPECT_EQ(error("driver.throttle,mass.engine.speed_rad_s"),
+              ":1: mass.engine.speed_rad_s: a column before it is of the same signal");
+    EXPECT_EQ(error("remark,remark"), "(no error)");
 }
 
 TEST(FieldReplay, InputsBeyondTheirRangeAreLimitedAndCounted) {

@@ -178,6 +178,16 @@ TEST(ScenarioFile, AValueBeyondTheSignalsRangeIsRefusedInTheUnitWritten) {
     EXPECT_EQ(signal_refusal("timeline: [{at_s: 1, source.motor.torque_nm: -1e9}]\n"), "");
 }
 
+TEST(ScenarioFile, NoBoundIsAboveAndBelow) {
+    const std::string where = "config/scenarios/s.yaml:5:", expect = head + "expect:\n";
+    for (const char* list : {"signals", "final"})
+        EXPECT_EQ(refusal(expect + "  " + list + ":\n    - {signal: mass.a.speed_rpm, min: 9, max: 3}\n"),
+                  where + "16: expect: mass.a.speed_rpm max = 3; must be at least min = 9");
+    EXPECT_EQ(refusal(expect + "  scorecard:\n    - {metric: duration_s, min: 0.5, max: 0.4}\n"),
+              where + "7: expect: duration_s max = 0.4; must be at least min = 0.5");
+    EXPECT_EQ(refusal(expect + "  scorecard:\n    - {metric: duration_s, min: 0.5, max: 0.5}\n"), "");
+}
+
 TEST(ScenarioFile, AMomentThatDoesNothingIsRefused) {
     EXPECT_EQ(refusal(head + "timeline:\n  - {at_s: 0.5, note: nothing}\n"),
               "config/scenarios/s.yaml:4:5: timeline: sets no signal");
