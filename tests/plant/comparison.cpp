@@ -317,6 +317,19 @@ Comparison compare(const RandomSystem& system, std::uint64_t seed, const Compari
             if (moves(which)) return true;
         return false;
     };
+    // Where mechanics is of one mind, so is the plant: turned round, it does the same turned round.
+    if (result.broken.empty() && reference_sound && !ambiguous && result.worst <= 1) {
+        Table image = run_plant(mirrored(d), layout, seed, options).table;
+        for (auto& row : image.rows)
+            for (double& value : row) value = -value;
+        Table upright = run.table;
+        upright.unit = layout.unit;
+        upright.unique = layout.unique;
+        const Deviation difference = deviation(upright, image, options);
+        if (difference.worst_speed > 1 && !is_sensitive())
+            result.broken.push_back(
+                text("its mirror image differs by %.3g tolerances", difference.worst_speed));
+    }
     if (!result.broken.empty())
         result.outcome = Outcome::broken;
     else if (!reference_sound)

@@ -424,6 +424,23 @@ RandomSystem random_system_with_friction_tables(std::uint64_t seed, double secon
     return system;
 }
 
+plant::Description mirrored(plant::Description d) {
+    for (auto& mass : d.masses) mass.initial_speed = -mass.initial_speed;
+    for (auto& shaft : d.shafts) shaft.initial_twist = -shaft.initial_twist;
+    for (auto& play : d.backlashes) play.initial_twist = -play.initial_twist;
+    for (auto& source : d.sources) {
+        for (auto& piece : source.waveform.pieces) {
+            piece.offset = -piece.offset;
+            piece.slope = -piece.slope;
+            piece.amplitude = -piece.amplitude;
+        }
+    }
+    for (auto& freewheel : d.freewheels)
+        freewheel.blocks =
+            freewheel.blocks == plant::Sense::forward ? plant::Sense::backward : plant::Sense::forward;
+    return d;
+}
+
 plant::Description side_by_side(plant::Description a, const plant::Description& b) {
     const auto add = [](auto& to, const auto& from, const auto&... ends) {
         for (auto device : from) {

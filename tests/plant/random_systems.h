@@ -32,6 +32,9 @@ RandomSystem random_system_with_friction_tables(std::uint64_t seed, double secon
 // Both machines in one description, joined by nothing; names of the second begin with "b.".
 plant::Description side_by_side(plant::Description a, const plant::Description& b);
 
+// The same machine with everything turned round: initial speeds and twists, torques, the sense in which freewheels block.
+plant::Description mirrored(plant::Description description);
+
 // ∫ waveform dt from 0 to `until`.
 double impulse(const plant::Waveform& waveform, double until);
 
