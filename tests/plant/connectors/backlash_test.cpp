@@ -408,7 +408,7 @@ TEST(Backlash, IsReadFromItsStanzaOrRefusedInOneLine) {
     EXPECT_EQ(refusal("{a: a, b: b, stiffness_nm_per_rad: 1, damping_nm_s_per_rad: 0, gap_rad: 0}"),
               "m.yaml:6:69: backlash \"B\": gap_rad = 0; must be > 0");
     EXPECT_EQ(refusal("{a: a, b: hub, stiffness_nm_per_rad: 1, damping_nm_s_per_rad: 0, gap_rad: 1}"),
-              "m.yaml:6:13: backlash \"B\": b = \"hub\" is not a mass; nearest: a");
+              "m.yaml:6:13: backlash \"B\": b = \"hub\" is not a mass; nearest: b");
     EXPECT_EQ(refusal("{a: a, b: b, stiffness_nm_per_rad: 1, damping_nm_s_per_rad: 0, gap_deg: 1}"),
               "m.yaml:6:69: backlash \"B\": gap_deg is not a known key; nearest: gap_rad");
 }
