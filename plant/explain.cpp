@@ -77,7 +77,9 @@ std::string explain(const Model& model, const Event& event) {
             // Located, it stands at its limit but for what locating leaves. With something left it goes because others do in
             // this instant, or because what it can hold falls.
             const double left = margin(event), little = 1e-4 * event.capacity;
-            const char* const how = left > little ? " of " : left < -little ? " beyond " : " at its limit of ";
+            const char* const how = left > little    ? " of "
+                                    : left < -little ? " beyond "
+                                                     : " at its limit of ";
             return line + "breaks away: " + torque + amount(event, event.torque) + how +
                    amount(event, event.capacity) + unit + " static" + (left > little ? " just before" : "");
         }
