@@ -63,7 +63,7 @@ std::string explain(const Model& model, const Event& event) {
     const bool straight = is_straight(m, event.device);
     const std::string torque = straight ? "force " : "torque ", unit = straight ? " N" : " Nm",
                       speed = straight ? " m/s" : " rad/s";
-    const std::string line = format("t=%.7f ", event.time) + name + " ";
+    std::string line = format("t=%.7f ", event.time) + name + " ";
     std::string words;
     for_each_connector(m.description, [&](const auto& connector) {
         if (event.device >= 0 && connector.name == name) words = in_words(connector, event);

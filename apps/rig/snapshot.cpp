@@ -86,8 +86,13 @@ Setup setup_of(const io::Manifest& snapshot) {
         return found == snapshot.facts.end() ? std::string() : found->second;
     };
     // What the model names beside it (CAN mapping, DBC) is looked for from where the snapshot was taken, if need be.
-    if (std::error_code ignored; !std::filesystem::exists(setup.model.path, ignored))
-        setup.model.path = (std::filesystem::path(fact("folder")) / setup.model.path).string();
+    if (setup.model.can.IsDefined()) {
+        try {
+            io::can::parse_mapping(setup.model.can, setup.model.path);
+        } catch (const io::InputError&) {
+            setup.model.path = (std::filesystem::path(fact("folder")) / setup.model.path).string();
+        }
+    }
     if (setup.scenario) follow_scenario(*setup.scenario, setup.buses);
     std::istringstream buses(fact("buses"));
     for (std::string name; buses >> name;) setup.buses.names.push_back(name);

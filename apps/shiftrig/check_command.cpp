@@ -9,6 +9,7 @@
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/examination.h"
 #include "apps/shiftrig/files.h"
+#include "apps/shiftrig/rig_options.h"
 #include "io/model_file.h"
 #include "io/scenario_file.h"
 
@@ -34,6 +35,7 @@ int run(const Options& options) {
     }
     if (options.model.empty()) throw CLI::RequiredError("MODEL");
     const io::ModelFile file = io::read_model(options.model);
+    if (!options.dot.empty() || !options.svg.empty()) options.files.check(files_of(file));
     const Examination examination = examine(file, 1 / options.rate_hz);
     if (!options.dot.empty()) write(options.dot, analysis::driveline_dot(file.description));
     if (!options.svg.empty()) write(options.svg, analysis::driveline_svg(file.description, true));

@@ -15,8 +15,16 @@ namespace shiftrig::cli {
 Child::Child(const std::string& command) : command_(command) {
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    // It hears signals, whatever its parent waits for elsewhere.
+    posix_spawnattr_setflags(&attributes,
+                             POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
     posix_spawnattr_setpgroup(&attributes, 0);
+    sigset_t none, ends;
+    sigemptyset(&none);
+    sigemptyset(&ends);
+    for (const int signal : {SIGINT, SIGTERM, SIGPIPE}) sigaddset(&ends, signal);
+    posix_spawnattr_setsigmask(&attributes, &none);
+    posix_spawnattr_setsigdefault(&attributes, &ends);
     std::string shell = "/bin/sh", option = "-c", text = command;
     char* arguments[] = {shell.data(), option.data(), text.data(), nullptr};
     const int error = posix_spawn(&process_, shell.c_str(), nullptr, &attributes, arguments, environ);

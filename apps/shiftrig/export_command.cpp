@@ -4,10 +4,12 @@
 
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/files.h"
+#include "apps/shiftrig/rig_options.h"
 #include "io/recording/candump.h"
 #include "io/recording/csv.h"
 #include "io/recording/mcap.h"
 #include "io/recording/reader.h"
+#include "io/recording/rebuild.h"
 
 namespace shiftrig::cli {
 
@@ -23,6 +25,8 @@ using Export = std::int64_t (*)(io::RecordingReader&, const std::string&);
 // What can be read is exported; what ended the reading early is told.
 int export_to(const Options& options, const std::string& path, Export write) {
     io::RecordingReader reader(options.recording);
+    if (write == io::export_candump)
+        options.files.check(files_of(io::recorded_model_file(reader.manifest())));
     const std::int64_t ticks = write(reader, path);
     if (path != "-") std::cerr << path << ": " << ticks << " ticks\n";
     if (reader.ending() == io::Ending::complete) return good;

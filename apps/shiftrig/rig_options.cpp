@@ -84,17 +84,26 @@ rt::LoopSettings RigOptions::loop(const rig::Setup& setup) const {
     return settings;
 }
 
-void RigOptions::check_files(const rig::Setup& setup) const {
-    std::vector<NamedFile> read = {{"the model", setup.model.path}};
-    if (setup.scenario) read.push_back({"the scenario", setup.scenario->path});
-    if (!setup.buses.calibration_path.empty())
-        read.push_back({"the controller's calibration", setup.buses.calibration_path});
-    if (setup.model.can.IsDefined()) {
-        const io::can::Mapping mapping = io::can::parse_mapping(setup.model.can, setup.model.path);
+std::vector<NamedFile> files_of(const io::ModelFile& model) {
+    std::vector<NamedFile> read = {{"the model", model.path}};
+    if (model.can.IsDefined()) {
+        const io::can::Mapping mapping = io::can::parse_mapping(model.can, model.path);
         read.push_back({"the CAN mapping", mapping.file});
         read.push_back({"the mapping's DBC", mapping.database.file});
     }
-    files.check(read);
+    return read;
+}
+
+std::vector<NamedFile> files_of(const rig::Setup& setup) {
+    std::vector<NamedFile> read = files_of(setup.model);
+    if (setup.scenario) read.push_back({"the scenario", setup.scenario->path});
+    if (!setup.buses.calibration_path.empty())
+        read.push_back({"the controller's calibration", setup.buses.calibration_path});
+    return read;
+}
+
+void RigOptions::check_files(const rig::Setup& setup) const {
+    files.check(files_of(setup));
 }
 
 void rehearse(const RigOptions& options, rig::Rig& rig) {

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/rig/choices.h"
 #include "apps/shiftrig/files.h"
@@ -11,6 +12,10 @@
 #include "rt/thread.h"
 
 namespace shiftrig::cli {
+
+// What a model, and what a rig is made of, reads from disk. Throws InputError where the CAN mapping cannot be read.
+std::vector<NamedFile> files_of(const io::ModelFile& model);
+std::vector<NamedFile> files_of(const rig::Setup& setup);
 
 struct RigOptions {
     rig::Choices choices;

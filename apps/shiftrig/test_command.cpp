@@ -211,7 +211,17 @@ void check_files(const Options& options) {
         if (!options.record_folder.empty())
             recordings.push_back({"--record", recording_of(options, place.stem().string())});
     }
-    options.files.check({}, recordings);
+    std::vector<NamedFile> read;
+    for (const auto& path : options.scenarios) {
+        rig::Choices choices = options.choices;
+        choices.scenario = path;
+        try {
+            for (auto& file : files_of(rig::make_setup(choices))) read.push_back(std::move(file));
+        } catch (const std::exception&) {
+            continue;  // told where the scenario is judged
+        }
+    }
+    options.files.check(read, recordings);
 }
 
 int run(const Options& options) {

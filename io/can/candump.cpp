@@ -124,6 +124,7 @@ std::vector<LogEntry> read_candump(const std::string& path) {
     std::string line;
     for (int number = 1; std::getline(in, line); ++number)
         if (auto entry = parse_candump_line(line, path, number)) entries.push_back(std::move(*entry));
+    if (entries.empty()) throw InputError(path, 0, 0, "has no frames");
     return entries;
 }
 

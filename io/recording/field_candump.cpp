@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -70,7 +71,8 @@ double between(const Samples& samples, double time) {
 bool looks_like_candump(const std::string& path) {
     std::ifstream file(path);
     char first = 0;
-    return file >> first && first == '(';
+    // A compressed recording begins with the same character, but no digit follows.
+    return file >> first && first == '(' && std::isdigit(file.peek());
 }
 
 FieldRecording read_field_candump(const std::string& path, const can::Mapping& original) {

@@ -90,6 +90,34 @@ class Outputs(Commands):
             self.assert_refused(f"--record {output}: is the file of {what}, which it would overwrite",
                                 *arguments, "--scenario", scenario, "--record", output)
 
+    def test_what_a_machine_reads_is_not_overwritten_by_other_commands(self):
+        shutil.copytree(CONFIG, self.path("cfg"))
+        name = "u.lcmlog"
+        self.shiftrig("run", "--scenario", "cfg/scenarios/plough_upshift.yaml", "--pace", "free", "--record", name)
+        for command in (("test", "cfg/scenarios/plough_upshift.yaml", "--junit", "cfg/tractor.yaml"),
+                        ("export", name, "--candump", "cfg/can/shiftrig.dbc"),
+                        ("check", "cfg/tractor.yaml", "--svg", "cfg/can/tractor.yaml")):
+            with open(self.path(command[-1]), "rb") as file:
+                before = file.read()
+            done = self.shiftrig(*command)
+            self.assertEqual(done.returncode, 2, command)
+            self.assertIn("which it would overwrite", done.stderr)
+            with open(self.path(command[-1]), "rb") as file:
+                self.assertEqual(file.read(), before, command)
+
+    def test_a_compressed_recording_is_replayed(self):
+        name = self.recorded(name="u.lcmlog.zst")
+        done = self.shiftrig("replay", name)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("ticks agree bit for bit", done.stdout)
+
+    def test_a_log_without_frames_is_told(self):
+        with open(self.path("empty.log"), "w"):
+            pass
+        done = self.shiftrig("run", "--scenario", SHIFT, "--pace", "free", "--can-replay", "empty.log")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("has no frames", done.stderr)
+
     def test_no_two_outputs_are_one_file(self):
         self.recorded("--duration", "0.5")
         os.symlink("not_yet.csv", self.path("link"))
