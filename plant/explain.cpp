@@ -30,7 +30,8 @@ std::string loop_of(const detail::ModelData& m, const Event& event) {
     std::string names;
     for (int i = 0; i < most_members; ++i) {
         if (event.members >> i & 1)
-            names += (names.empty() ? "" : ", ") + m.device_names[static_cast<std::size_t>(event.device + i)];
+            names += (names.empty() ? "" : ", ") +
+                     m.device_names[static_cast<std::size_t>(event.device) + static_cast<std::size_t>(i)];
     }
     return names + (event.members >> most_members & 1 ? " and others" : "");
 }
