@@ -22,12 +22,17 @@ void pivot(double* tableau, int size, int row, int column) {
     }
 }
 
+// What a tie is to the values of the rows: rates may be large, where loads are shared out by a little give.
+double largest_of(double rate_a, double rate_b) {
+    return std::fmax(1, std::fmax(rate_a, rate_b));
+}
+
 // Does row a leave before row b, if a variable enters that takes `rate` of each? Ties are broken by what w would
 // give (lexicographically), so that no basis comes back.
 bool leaves_before(const double* a, double rate_a, const double* b, double rate_b, int size) {
     const int last = lemke_columns(size) - 1;
     const double difference = a[last] / rate_a - b[last] / rate_b;
-    if (std::fabs(difference) > nothing) return difference < 0;
+    if (std::fabs(difference) * largest_of(rate_a, rate_b) > nothing) return difference < 0;
     for (int c = 0; c < size; ++c) {
         const double by_column = a[c] / rate_a - b[c] / rate_b;
         if (std::fabs(by_column) > nothing) return by_column < 0;
@@ -62,10 +67,12 @@ bool solve_complementarity(double* tableau, int* basis, int size) SHIFTRIG_REALT
             if (rate <= nothing) continue;
             const double* const best = row < 0 ? line : tableau + row * columns;
             const bool sooner = row < 0 || leaves_before(line, rate, best, best[entering], size);
-            const bool ends = basis[r] == artificial && row >= 0 &&
-                              line[last] / rate <= best[last] / best[entering] + nothing;
-            const bool kept = row >= 0 && basis[row] == artificial &&
-                              best[last] / best[entering] <= line[last] / rate + nothing;
+            const bool ends =
+                basis[r] == artificial && row >= 0 &&
+                (line[last] / rate - best[last] / best[entering]) * largest_of(1, best[entering]) <= nothing;
+            const bool kept =
+                row >= 0 && basis[row] == artificial &&
+                (best[last] / best[entering] - line[last] / rate) * largest_of(1, rate) <= nothing;
             if ((sooner && !kept) || ends) row = r;
         }
         if (row < 0) return false;

@@ -113,7 +113,10 @@ struct Search {
         unsigned char* const trial = w.scratch.trial.data();
         std::copy(w.contact, w.contact + w.model.contact_bytes, trial);
         for (int i = 0; i < rest.count; ++i) trial[rest.joints[i].device] = state(i);
-        return is_consistent(w, rest.piece, trial, goes, s);
+        if (!is_consistent(w, rest.piece, trial, goes, s)) return false;
+        // States that leave the one at its limit there, closed, are no answer.
+        return gives_way < 0 || trial[gives_way] != closed ||
+               std::fabs(s.torque[gives_way]) <= std::fabs(given) * (1 - 0.5 * at_its_limit);
     }
     // As few changes as do, so that torques that are not unique stay nearly what they were.
     bool attempt_least() {
@@ -168,7 +171,9 @@ struct Search {
             }
             if (attempt_least() || attempt_shared(Split::as_modes) || attempt_shared(Split::on_losses))
                 return true;
-            if (!break_more_away()) return attempt([&](int i) { return vertex[i]; });
+            if (break_more_away()) continue;
+            if (!breaks_away || overcome(gives_way)) return attempt([&](int i) { return vertex[i]; });
+            break_away(giving);  // it is at its limit whatever the split leaves it
         }
     }
 

@@ -19,10 +19,10 @@ using detail::ModelData;
 constexpr double at_rest = 1e-9;  // [rad/s]
 
 // The speeds nearest to `wanted` (in the sense of kinetic energy, so that momentum is conserved) for which
-// the named columns slip at zero and the pinned masses turn as told.
+// the named columns slip at zero and the pinned masses turn as told. `mounted`: what a spring holds to the housing stands.
 Eigen::VectorXd compatible_speeds(const ModelData& m, const Eigen::VectorXd& wanted,
                                   const std::vector<int>& locked, bool following,
-                                  const std::vector<std::pair<int, double>>& pinned) {
+                                  const std::vector<std::pair<int, double>>& pinned, bool mounted = true) {
     const Structure& s = m.structure;
     const Eigen::MatrixXd pairs = s.pair_columns(), meshes = s.mesh_columns(), shafts = s.shaft_columns();
     const auto is_told = [&](int mass) {
@@ -34,11 +34,9 @@ Eigen::VectorXd compatible_speeds(const ModelData& m, const Eigen::VectorXd& wan
     for (std::size_t t = 0; following && t < m.tyres.size(); ++t) {
         if (!is_told(m.tyres[t].body)) rolling.push_back(t);
     }
-    // What a spring holds to the housing stands, unless its speed is told.
     std::vector<Eigen::Index> untwisted;
     for (Eigen::Index k = 0; following && k < shafts.cols(); ++k) {
-        const auto& links = s.shafts[static_cast<std::size_t>(k)].links;
-        if (links[1].mass >= 0 || !is_told(links[0].mass)) untwisted.push_back(k);
+        if (mounted || s.shafts[static_cast<std::size_t>(k)].links[1].mass >= 0) untwisted.push_back(k);
     }
     const Eigen::Index rows =
         static_cast<Eigen::Index>(locked.size() + pinned.size() + rolling.size() + untwisted.size()) +
@@ -254,7 +252,14 @@ void start(const Model& model, State& state, const Start& start, const Inputs& i
         pinned.emplace_back(mass, speed);
     }
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(m.masses);
+    const auto are_as_told = [&](const Eigen::VectorXd& speeds) {
+        return std::all_of(pinned.begin(), pinned.end(), [&](const auto& pin) {
+            return std::fabs(speeds(pin.first) - pin.second) <= 1e-9 * (1 + std::fabs(pin.second));
+        });
+    };
     Eigen::VectorXd speeds = compatible_speeds(m, rest, locked, true, pinned);
+    // A spring to the housing holds nothing rigidly: what is told moves it.
+    if (!are_as_told(speeds)) speeds = compatible_speeds(m, rest, locked, true, pinned, false);
     // What nothing drives stands, exactly: a wheel that creeps at 1e-16 rad/s would have any slip.
     const double rounding = 1e-12 * speeds.cwiseAbs().maxCoeff();
     for (double& speed : speeds) {

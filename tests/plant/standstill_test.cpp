@@ -115,6 +115,48 @@ TEST(Standstill, ABrakeHoldsWhatTheLossesOfItsGearLeaveIt) {
     EXPECT_NEAR(both.forward.state.speeds()[2], -10.2875, 1e-4);
 }
 
+Clutch held(const char* name, const char* a, const char* b, double sliding, double static_ratio = 1) {
+    Clutch c = clutch(name, a, b, sliding, static_ratio);
+    c.initially_locked = true;
+    return c;
+}
+
+// The one at its limit is just below it in the split of minimum norm; nobody else is, and it breaks away all the same.
+TEST(Standstill, FourBrakesAroundARow) {
+    Description d;
+    d.masses = {mass("m0", 0.09234), mass("m1", 0.02439), mass("m2", 0.1284)};
+    d.planetaries = {{.name = "row", .sun = "m2", .ring = "m0", .carrier = "m1", .ratio = -3.775}};
+    d.clutches = {held("B0", "m1", "", 25.22), held("B1", "m2", "m0", 7.175, 1.99),
+                  held("B2", "m1", "", 27.12, 1.375), held("B3", "m0", "", 12.01)};
+    auto& falling = std::get<DryFriction>(d.clutches[2].friction);
+    falling.falling = 0.413;
+    falling.falling_speed = 1.815;
+    d.sources = {source("m0", sine(43.15, 4.505)), source("m2", sine(76.78, 6.991))};
+    const Both both(d, 0.01);
+    both.expect_mirror_images();
+    ASSERT_EQ(both.forward.times(EventKind::break_away, "B1").size(), 1u);
+    EXPECT_NEAR(both.forward.times(EventKind::break_away, "B1")[0], 0.0059111, 1e-6);
+    EXPECT_TRUE(both.forward.times(EventKind::break_away, "B2").empty());
+}
+
+// One that slides at rest is not locked again by what it could hold: it did so until the events of the step were used up.
+TEST(Standstill, ABrakeDoesNotLockAndBreakAwayInOneInstant) {
+    Description d;
+    d.masses = {mass("m0", 0.04263), mass("m1", 0.07009), mass("m2", 0.05324)};
+    d.gears = {lossy_gear("g1", "m0", "m1", -0.5467, 1, 0.4357),
+               lossy_gear("g2", "m0", "m2", -3.544, 0.7755, 0)};
+    d.shafts = {{.name = "sh", .a = "m2", .b = "m0", .stiffness = 589.4, .damping = 0.7474}};
+    d.clutches = {held("B0", "m0", "", 11.63, 1.172), held("B1", "m2", "", 25.39)};
+    d.sources = {source("m1", ramp(-364.9))};
+    const Both both(d, 0.05);
+    both.expect_mirror_images();
+    for (const Rig* rig : {&both.forward, &both.backward}) {
+        EXPECT_EQ(rig->fall_backs, 0);
+        EXPECT_EQ(rig->times(EventKind::break_away, "B1").size(), 1u);
+        EXPECT_TRUE(rig->times(EventKind::lock, "B1").empty());
+    }
+}
+
 // The simple rule looks at the ends of steps, but then asks the same of what holds together.
 TEST(Standstill, TheNextStepRuleLetsOthersTakeALoadAsWell) {
     Description d;

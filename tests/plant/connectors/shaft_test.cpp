@@ -85,6 +85,15 @@ TEST(Shaft, ToTheHousingHoldsAtTheStartWhatNobodyMoves) {
     EXPECT_NEAR(rig.state.speeds()[2], 30, 1e-12);
     start(rig.model, rig.state, {{}, {{"engine", 90}, {"ring", 6}}}, rig.inputs);
     EXPECT_NEAR(rig.state.speeds()[1], 6, 1e-12);
+
+    // Also behind another shaft.
+    Description line;
+    line.masses = {mass("m", 1), mass("n", 1)};
+    line.shafts = {mount("n", "", 1e4), {.name = "shaft", .a = "m", .b = "n", .stiffness = 1e3}};
+    Rig two(line);
+    start(two.model, two.state, {{}, {{"m", 4}}}, two.inputs);
+    EXPECT_NEAR(two.state.speeds()[0], 4, 1e-12);
+    EXPECT_NEAR(two.state.speeds()[1], 4, 1e-12);
 }
 
 TEST(Shaft, ToTheHousingIsNotForTheEngineOfLongChains) {
