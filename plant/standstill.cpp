@@ -65,6 +65,7 @@ struct Search {
     unsigned char vertex[most_joints] = {};  // the joints' states in the exact solution,
     bool going[most_joints] = {};            // does it go?
     bool given_way[most_joints] = {};        // taken to have broken away
+    double use[most_joints] = {};            // of the static limits, before anything gives way
 
     unsigned char& overcome(int device) const { return w.scratch.overcome[static_cast<std::size_t>(device)]; }
     // Would the pair hold more than it passes once it slips in this sense?
@@ -134,28 +135,36 @@ struct Search {
                    return going[i] ? vertex[i] : state_of(rest, i, side_of(rest, i, share));
                });
     }
-    // Pairs that go, or else those at their limit as modes share the load, break away if they pass less on sliding: the others
-    // have to do with that. Did any?
+    int most_used_of_going() const {
+        int most = -1;
+        for (int i = 0; i < rest.count; ++i) {
+            const RestJoint& joint = rest.joints[i];
+            if (joint.mesh >= 0 || !going[i] || !has_reserve(joint.device, slip_sign(vertex[i]))) continue;
+            if (most < 0 || use[i] > use[most]) most = i;
+        }
+        return most;
+    }
+    // Pairs at their limit as modes share the load break away if they pass less on sliding: the others have to do with
+    // that. Did any?
     bool break_more_away() {
         bool breaks = false;
-        const auto consider = [&](int i, double sense) {
+        if (!solve(Split::as_modes)) return false;
+        for (int i = 0; i < rest.count; ++i) {
             const RestJoint& joint = rest.joints[i];
-            if (joint.mesh >= 0 || sense == 0 || !has_reserve(joint.device, sense)) return;
+            double share;
+            const int side = side_of(rest, i, share);
+            if (going[i] || joint.mesh >= 0 || side == 0 || !has_reserve(joint.device, side)) continue;
             break_away(i);
             breaks = true;
-        };
-        for (int i = 0; i < rest.count; ++i) {
-            if (going[i] && rest.joints[i].mesh < 0) consider(i, slip_sign(vertex[i]));
-        }
-        if (breaks || !solve(Split::as_modes)) return breaks;
-        for (int i = 0; i < rest.count; ++i) {
-            double share;
-            if (!going[i]) consider(i, side_of(rest, i, share));
         }
         return breaks;
     }
 
     bool find() {
+        for (int i = 0; i < rest.count; ++i) {
+            const int k = rest.joints[i].device;
+            if (rest.joints[i].mesh < 0) use[i] = std::fabs(s.torque[k]) / static_limit(w, k, s);
+        }
         int giving = 0;
         while (giving < rest.count && rest.joints[giving].device != gives_way) ++giving;
         const bool breaks_away =
@@ -167,6 +176,11 @@ struct Search {
             if (!solve_exactly()) return false;
             if (goes && breaks_away && !overcome(gives_way)) {
                 break_away(giving);
+                continue;
+            }
+            // Of those that go, the one that uses most of what it holds breaks away, and leaves the others less.
+            if (const int most = most_used_of_going(); most >= 0) {
+                break_away(most);
                 continue;
             }
             if (attempt_least() || attempt_shared(Split::as_modes) || attempt_shared(Split::on_losses))

@@ -424,6 +424,83 @@ RandomSystem random_system_with_friction_tables(std::uint64_t seed, double secon
     return system;
 }
 
+RandomSystem random_system_of_brakes(std::uint64_t seed, double seconds) {
+    Dice dice(seed + 0xb4a);
+    RandomSystem system;
+    Description& d = system.description;
+    d.name = "brakes " + std::to_string(seed);
+    const int masses = dice.integer(1, 5);
+    const auto any = [&](int before) { return "m" + std::to_string(dice.integer(0, before - 1)); };
+    const auto pair = [&](const std::string& name, const std::string& a, const std::string& b) {
+        Clutch c;
+        c.name = name;
+        c.a = a;
+        c.b = b;
+        DryFriction friction;
+        friction.sliding_capacity = dice.logarithmic(5, 60);
+        friction.static_ratio = dice.chance(0.7) ? dice.uniform(1, 2) : 1;
+        if (dice.chance(0.25)) {
+            friction.falling = dice.uniform(0.1, 0.5);
+            friction.falling_speed = dice.uniform(0.5, 5);
+        }
+        c.friction = friction;
+        c.actuation = ActuationConstant{};
+        if (dice.chance(0.3)) {  // lets go slowly
+            const double from = dice.uniform(0.1, 0.4) * seconds, slope = -dice.uniform(0.4, 1.8) / seconds;
+            c.actuation =
+                ActuationDirect{{{{.until = from, .offset = 1},
+                                  {.from = from, .until = from + 0.5 * seconds, .offset = 1, .slope = slope},
+                                  {.from = from + 0.5 * seconds, .offset = 1 + 0.5 * seconds * slope}}}};
+        }
+        c.initially_locked = true;
+        d.clutches.push_back(c);
+    };
+    for (int i = 0; i < masses; ++i) {
+        const std::string here = "m" + std::to_string(i), number = std::to_string(i);
+        d.masses.push_back({.name = here, .inertia = dice.logarithmic(0.01, 2)});
+        if (i == 0) continue;
+        if (dice.chance(0.2)) {
+            pair("k" + number, any(i), here);
+        } else if (i >= 2 && dice.chance(0.25)) {
+            // Its other two links are free of one another, or it closes a loop of gears.
+            d.planetaries.push_back({.name = "r" + number,
+                                     .sun = here,
+                                     .ring = "m" + std::to_string(i - 1),
+                                     .carrier = "m" + std::to_string(i - 2),
+                                     .ratio = -dice.uniform(1.5, 4),
+                                     .efficiency = dice.chance(0.6) ? dice.uniform(0.85, 1) : 1});
+        } else {
+            Gear gear;
+            gear.name = "g" + number;
+            gear.a = any(i);
+            gear.b = here;
+            gear.ratio = dice.logarithmic(0.3, 4) * (dice.chance(0.5) ? 1 : -1);
+            gear.efficiency = dice.chance(0.7) ? dice.uniform(0.7, 1) : 1;
+            gear.bearing_torque = dice.chance(0.5) ? dice.uniform(0, 3) : 0;
+            d.gears.push_back(gear);
+        }
+    }
+    for (int k = dice.integer(1, 4); k > 0; --k) {
+        const std::string a = any(masses), b = dice.chance(0.25) ? any(masses) : "";
+        pair("B" + std::to_string(k), a, a == b ? "" : b);
+    }
+    for (int k = dice.integer(1, 3); k > 0; --k) {
+        const double torque = dice.logarithmic(10, 200) * (dice.chance(0.5) ? 1 : -1);
+        TorqueSource source;
+        source.name = "t" + std::to_string(k);
+        source.mass = any(masses);
+        if (dice.chance(0.4))
+            source.waveform = {{{.from = 0, .slope = torque / (0.5 * seconds)}}};
+        else if (dice.chance(0.5))
+            source.waveform = {{{.amplitude = torque, .frequency = dice.uniform(1, 12)}}};
+        else
+            source.waveform = {{{.offset = 0.3 * torque}}};
+        d.sources.push_back(source);
+    }
+    system.traits = "n=" + std::to_string(masses);
+    return system;
+}
+
 plant::Description mirrored(plant::Description d) {
     for (auto& mass : d.masses) mass.initial_speed = -mass.initial_speed;
     for (auto& shaft : d.shafts) shaft.initial_twist = -shaft.initial_twist;

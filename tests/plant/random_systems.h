@@ -29,6 +29,10 @@ RandomSystem random_system_with_backlashes(std::uint64_t seed, double seconds);
 // The same machines with friction factors from tables in some of their clutches: rising and falling over the slip, with kinks.
 RandomSystem random_system_with_friction_tables(std::uint64_t seed, double seconds);
 
+// One to five masses on gears and rows, at rest between brakes and clutches that mostly hold more than they pass on sliding,
+// under loads that grow, wave or stay: what holds together, and what gives way first.
+RandomSystem random_system_of_brakes(std::uint64_t seed, double seconds);
+
 // Both machines in one description, joined by nothing; names of the second begin with "b.".
 plant::Description side_by_side(plant::Description a, const plant::Description& b);
 

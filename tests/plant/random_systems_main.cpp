@@ -44,7 +44,7 @@ struct Arguments {
 const char usage[] =
     "usage: shiftrig_random_systems [--count N] [--seed S | --seeds A,B,…] [--seconds T] [--jobs J] "
     "[--substeps K] "
-    "[--kind plain|freewheels|backlashes|tables|forests|lossy_forests] [--method etd3|ark3] "
+    "[--kind plain|freewheels|backlashes|tables|brakes|forests|lossy_forests] [--method etd3|ark3] "
     "[--verbose]\n"
     "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --verbose prints each "
     "that does not agree\n";
@@ -88,6 +88,8 @@ bool parse(int argc, char** argv, Arguments& a) {
             a.make = random_system_with_backlashes;
         else if (key == "--kind" && value == std::string("tables"))
             a.make = random_system_with_friction_tables;
+        else if (key == "--kind" && value == std::string("brakes"))
+            a.make = random_system_of_brakes;
         else if (key == "--kind" && value == std::string("forests"))
             a.make = random_forest;
         else if (key == "--kind" && value == std::string("lossy_forests"))
