@@ -29,7 +29,7 @@ option(SHIFTRIG_FUZZ "build the libFuzzer targets (clang; scripts/fuzz)" OFF)
 if(SHIFTRIG_FUZZ)
   # What reads foreign bytes, and no more of the project than that needs.
   file(GLOB FUZZED CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/io/can/*.cpp)
-  add_library(fuzzed STATIC ${FUZZED} ${CMAKE_SOURCE_DIR}/io/signals.cpp ${CMAKE_SOURCE_DIR}/plant/signal.cpp)
+  add_library(fuzzed STATIC ${FUZZED} ${CMAKE_SOURCE_DIR}/io/signals.cpp ${CMAKE_SOURCE_DIR}/io/text_file.cpp ${CMAKE_SOURCE_DIR}/plant/signal.cpp)
   target_link_libraries(fuzzed PUBLIC shiftrig_options yaml-cpp Threads::Threads)
   foreach(target dbc candump datagram frames)
     add_executable(fuzz_${target} ${CMAKE_CURRENT_LIST_DIR}/can_fuzzer.cpp)
