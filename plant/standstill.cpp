@@ -117,7 +117,8 @@ struct Search {
         if (!is_consistent(w, rest.piece, trial, goes, s)) return false;
         // States that leave the one at its limit there, closed, are no answer.
         return gives_way < 0 || trial[gives_way] != closed ||
-               std::fabs(s.torque[gives_way]) <= std::fabs(given) * (1 - 0.5 * at_its_limit);
+               opening_sense(w, gives_way, given, s) * (s.torque[gives_way] - given) <
+                   -0.5 * at_its_limit * std::fabs(given);
     }
     // As few changes as do, so that torques that are not unique stay nearly what they were.
     bool attempt_least() {

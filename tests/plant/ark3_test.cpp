@@ -105,13 +105,14 @@ TEST(Ark3, RunsOfRandomForestsAgreeWithTheDenseEngine) {
 }
 
 // Behind the first hundred: those in which trains at rest have to share out their loads anew. In most a mesh takes part
-// of what is too much for a brake; in 194, 222, 388, 507 and 571 pairs and meshes hand it on to one another; in 777 no
+// of what is too much for a brake; in 194, 222, 388 and 507 pairs and meshes hand it on to one another; in 777 no
 // loss directions agree with some of the splits. Not 477: there a brake at its limit may let go, or another one at rest beside
-// it push the other way; mechanics leaves that open, and which of both the engines find is a matter of rounding.
+// it push the other way; mechanics leaves that open, and which of both the engines find is a matter of rounding. Nor 571, whose gears
+// lose up to 0.39 of what passes: there the reference itself moves by more than the tolerance where it is perturbed by 1e-9.
 TEST(Ark3, RunsWithLossyGearsAgreeWithTheDenseEngine) {
     Agreement result;
-    compare_runs(true, forests(100, {114, 125, 170, 194, 216, 222, 388, 418, 433, 507, 516, 543, 571, 777}),
-                 1e-4, result);
+    compare_runs(true, forests(100, {114, 125, 170, 194, 216, 222, 388, 418, 433, 507, 516, 543, 777}), 1e-4,
+                 result);
     EXPECT_EQ(result.differ, 0) << result.worst;
 }
 
