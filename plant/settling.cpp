@@ -136,6 +136,13 @@ bool lean_on_losses(Work& w, const Mode& mode, const Use& most, Sample& s) SHIFT
     return found;
 }
 
+bool give_way(Work& w, const Mode& mode, const Use& most, int pair, Sample& s) SHIFTRIG_REALTIME {
+    if (lean_on_losses(w, mode, most, s)) return false;
+    const Rearrangement found = rearrange(w, pair, pair, s);
+    if (found == Rearrangement::none) open_pair(w, mode, pair, s);
+    return found != Rearrangement::stands;
+}
+
 Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
     if (!complete) {
         look(w.model, find_mode(w.model, w.operators, w.contact, w.scratch), s);
@@ -149,9 +156,7 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
             if (release_stuck_meshes(w, mode, s) || leave_to_pairs(w, mode, s)) continue;
             const Use worst = most_used(w, w.contact, s);
             if (is_overloaded(w, worst.pair, s)) {
-                if (lean_on_losses(w, mode, worst, s)) continue;
-                if (rearrange(w, worst.pair, worst.pair, s) == Rearrangement::none)
-                    open_pair(w, mode, worst.pair, s);
+                give_way(w, mode, worst, worst.pair, s);
                 continue;
             }
         }

@@ -14,7 +14,6 @@ namespace shiftrig::plant::detail {
 namespace {
 
 constexpr unsigned char closed = locked;  // and stuck
-constexpr double at_its_limit = 1e-5;     // a pair that gives way holds so much less: well above rounding
 constexpr double resting = 1e-12;         // share of the accelerations there could be: none
 
 // Torque limits of a pair: what it can hold, or, once it broke away in this instant, what it passes on sliding.

@@ -252,25 +252,24 @@ void start(const Model& model, State& state, const Start& start, const Inputs& i
         pinned.emplace_back(mass, speed);
     }
     const Eigen::VectorXd rest = Eigen::VectorXd::Zero(m.masses);
-    const auto are_as_told = [&](const Eigen::VectorXd& speeds) {
-        return std::all_of(pinned.begin(), pinned.end(), [&](const auto& pin) {
-            return std::fabs(speeds(pin.first) - pin.second) <= 1e-9 * (1 + std::fabs(pin.second));
+    using Told = std::pair<int, double>;
+    const auto first_missed = [&](const Eigen::VectorXd& speeds) {
+        return std::find_if(pinned.begin(), pinned.end(), [&](const Told& told) {
+            return std::fabs(speeds(told.first) - told.second) > 1e-9 * (1 + std::fabs(told.second));
         });
     };
     Eigen::VectorXd speeds = compatible_speeds(m, rest, locked, true, pinned);
     // A spring to the housing holds nothing rigidly: what is told moves it.
-    if (!are_as_told(speeds)) speeds = compatible_speeds(m, rest, locked, true, pinned, false);
+    if (first_missed(speeds) != pinned.end())
+        speeds = compatible_speeds(m, rest, locked, true, pinned, false);
     // What nothing drives stands, exactly: a wheel that creeps at 1e-16 rad/s would have any slip.
     const double rounding = 1e-12 * speeds.cwiseAbs().maxCoeff();
     for (double& speed : speeds) {
         if (std::fabs(speed) < rounding) speed = 0;
     }
-    for (const auto& [mass, speed] : pinned) {
-        if (std::fabs(speeds(mass) - speed) > 1e-9 * (1 + std::fabs(speed))) {
-            throw ModelError("start", m.structure.mass_names[static_cast<std::size_t>(mass)], "speeds",
-                             "contradicts the other speeds through gears and locked devices");
-        }
-    }
+    if (const auto missed = first_missed(speeds); missed != pinned.end())
+        throw ModelError("start", m.structure.mass_names[static_cast<std::size_t>(missed->first)], "speeds",
+                         "contradicts the other speeds through gears and locked devices");
     std::fill(state.block.begin() + detail::StateLayout::header, state.block.end(), 0.);
     detail::write_integer(&state.block[0], 0);
     std::copy(speeds.begin(), speeds.end(), state.block.data() + m.layout.speeds);

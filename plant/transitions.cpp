@@ -119,19 +119,14 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
 
 namespace {
 
-// A locked pair at its limit gives way, unless meshes at rest or other pairs take its load. Does anything move?
+// Found within a step, where the loss of a mesh at rest turns unseen, and allows more or less then.
 bool give_way(Work& w, int pair, Sample& s) {
-    constexpr double at_its_limit = 1e-5;
     Mode* mode = &find_mode(w.model, w.operators, w.contact, w.scratch);
     if (mode->rests) {
-        // The loss of a mesh at rest turns unseen within a step, and allows more or less then.
         mode = &find_directions(w, w.contact, s);
         if (static_margin(w, pair, s) > at_its_limit * static_limit(w, pair, s)) return false;
     }
-    if (lean_on_losses(w, *mode, most_used(w, w.contact, s), s)) return false;
-    const Rearrangement found = rearrange(w, pair, pair, s);
-    if (found == Rearrangement::none) open_pair(w, *mode, pair, s);
-    return found != Rearrangement::stands;
+    return give_way(w, *mode, most_used(w, w.contact, s), pair, s);
 }
 
 }  // namespace

@@ -212,7 +212,8 @@ void check_files(const Options& options) {
             recordings.push_back({"--record", recording_of(options, place.stem().string())});
     }
     std::vector<NamedFile> read;
-    for (const auto& path : options.scenarios) {
+    const bool writes = !options.junit.empty() || !recordings.empty();
+    for (const auto& path : writes ? options.scenarios : std::vector<std::string>{}) {
         rig::Choices choices = options.choices;
         choices.scenario = path;
         try {
