@@ -323,19 +323,24 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
         add_scaled(motion + c * states, factor, response, n);
         add_scaled(torque + c * torque_rows, factor, reaction, rows);
     };
+    const auto damp = [&](const Elastic& elastic) {
+        for (const Link& link : elastic.links) {
+            if (link.mass >= 0) add_to(link.mass, elastic.damping * link.factor);
+        }
+    };
     for (int e = 0; e < m.twists; ++e) {
         const Elastic& shaft = s.shafts[static_cast<std::size_t>(e)];
-        for (const Link& link : shaft.links) motion[link.mass * states + n + e] = link.factor;  // φ̇
+        for (const Link& link : shaft.links) {
+            if (link.mass >= 0) motion[link.mass * states + n + e] = link.factor;  // φ̇
+        }
         if (!is_shaft_closed(m, mode, e)) continue;
         apply(shaft.links);
         add_to(n + e, shaft.stiffness);
-        for (const Link& link : shaft.links) add_to(link.mass, shaft.damping * link.factor);
+        damp(shaft);
     }
     for (const Elastic& damper : s.dampers) {
         apply(damper.links);
-        for (const Link& link : damper.links) {
-            if (link.mass >= 0) add_to(link.mass, damper.damping * link.factor);
-        }
+        damp(damper);
     }
     for (int k = 0; k < m.forces; ++k) {
         apply(m.force_columns[static_cast<std::size_t>(k)]);

@@ -53,4 +53,15 @@ Description Forest::build(bool losses) {
     return d;
 }
 
+void add_mounts(Description& machine, std::uint64_t seed) {
+    Forest draw(seed);
+    for (const Mass& mass : machine.masses) {
+        if (draw.below(3) != 0) continue;
+        const double omega = draw.real(10, 300), damping_ratio = draw.real(0, 0.3),
+                     twist = draw.real(-0.1, 0.1) / omega;
+        machine.shafts.push_back({"mount_" + mass.name, mass.name, "", mass.inertia * omega * omega,
+                                  2 * damping_ratio * mass.inertia * omega, twist});
+    }
+}
+
 }  // namespace shiftrig::plant

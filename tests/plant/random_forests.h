@@ -18,4 +18,7 @@ struct Forest {
     Description build(bool losses);
 };
 
+// Hangs about every third mass of any machine on a spring to the housing, of 10…300 rad/s.
+void add_mounts(Description& machine, std::uint64_t seed);
+
 }  // namespace shiftrig::plant

@@ -7,6 +7,8 @@
 #include <random>
 #include <vector>
 
+#include "tests/plant/random_forests.h"
+
 namespace shiftrig {
 namespace {
 
@@ -554,6 +556,12 @@ double impulse(const Waveform& waveform, double until) {
         }
     }
     return sum;
+}
+
+RandomSystem with_mounts(RandomSystem system, std::uint64_t seed) {
+    plant::add_mounts(system.description, seed);
+    system.momentum_is_conserved = false;
+    return system;
 }
 
 }  // namespace shiftrig

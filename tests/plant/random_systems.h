@@ -33,6 +33,9 @@ RandomSystem random_system_with_friction_tables(std::uint64_t seed, double secon
 // under loads that grow, wave or stay: what holds together, and what gives way first.
 RandomSystem random_system_of_brakes(std::uint64_t seed, double seconds);
 
+// The machine with about every third mass on a spring to the housing (random_forests.h).
+RandomSystem with_mounts(RandomSystem system, std::uint64_t seed);
+
 // Both machines in one description, joined by nothing; names of the second begin with "b.".
 plant::Description side_by_side(plant::Description a, const plant::Description& b);
 

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "io/number.h"
@@ -31,23 +32,34 @@ RandomSystem random_lossy_forest(std::uint64_t seed, double) {
     return forest(seed, true);
 }
 
+using Maker = RandomSystem (*)(std::uint64_t seed, double seconds);
+const std::map<std::string, Maker> kinds = {
+    {"plain", random_system},
+    {"freewheels", random_system_with_freewheels},
+    {"backlashes", random_system_with_backlashes},
+    {"tables", random_system_with_friction_tables},
+    {"brakes", random_system_of_brakes},
+    {"forests", random_forest},
+    {"lossy_forests", random_lossy_forest},
+};
+
 struct Arguments {
     long count = 100, jobs = 1;
     std::uint64_t seed = 1;
     std::vector<std::uint64_t> seeds;  // instead of count and seed
     ComparisonOptions options;
-    RandomSystem (*make)(std::uint64_t, double) = random_system;
+    Maker make = random_system;
     plant::Method method = plant::Method::automatic;
-    bool verbose = false;
+    bool mounts = false, verbose = false;
 };
 
 const char usage[] =
     "usage: shiftrig_random_systems [--count N] [--seed S | --seeds A,B,…] [--seconds T] [--jobs J] "
     "[--substeps K] "
-    "[--kind plain|freewheels|backlashes|tables|brakes|forests|lossy_forests] [--method etd3|ark3] "
-    "[--verbose]\n"
-    "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --verbose prints each "
-    "that does not agree\n";
+    "[--kind plain|freewheels|backlashes|tables|brakes|forests|lossy_forests] "
+    "[--mounts] [--method etd3|ark3] [--verbose]\n"
+    "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --mounts hangs masses on "
+    "springs to the housing; --verbose prints each that does not agree\n";
 
 std::vector<std::uint64_t> numbers(const char* list) {
     std::vector<std::uint64_t> found;
@@ -58,8 +70,8 @@ std::vector<std::uint64_t> numbers(const char* list) {
 bool parse(int argc, char** argv, Arguments& a) {
     for (int i = 1; i < argc; ++i) {
         const std::string key = argv[i];
-        if (key == "--verbose") {
-            a.verbose = true;
+        if (key == "--verbose" || key == "--mounts") {
+            (key == "--mounts" ? a.mounts : a.verbose) = true;
             continue;
         }
         if (i + 1 >= argc) return false;
@@ -80,20 +92,8 @@ bool parse(int argc, char** argv, Arguments& a) {
             a.method = plant::Method::etd3;
         else if (key == "--method" && value == std::string("ark3"))
             a.method = plant::Method::ark3;
-        else if (key == "--kind" && value == std::string("plain"))
-            a.make = random_system;
-        else if (key == "--kind" && value == std::string("freewheels"))
-            a.make = random_system_with_freewheels;
-        else if (key == "--kind" && value == std::string("backlashes"))
-            a.make = random_system_with_backlashes;
-        else if (key == "--kind" && value == std::string("tables"))
-            a.make = random_system_with_friction_tables;
-        else if (key == "--kind" && value == std::string("brakes"))
-            a.make = random_system_of_brakes;
-        else if (key == "--kind" && value == std::string("forests"))
-            a.make = random_forest;
-        else if (key == "--kind" && value == std::string("lossy_forests"))
-            a.make = random_lossy_forest;
+        else if (key == "--kind" && kinds.contains(value))
+            a.make = kinds.at(value);
         else
             return false;
     }
@@ -122,6 +122,7 @@ int main(int argc, char** argv) {
                                            : arguments.seeds[static_cast<std::size_t>(i)];
             RandomSystem system = arguments.make(seed, arguments.options.seconds);
             system.description.method = arguments.method;
+            if (arguments.mounts) system = with_mounts(std::move(system), seed);
             Comparison c;
             try {
                 c = compare(system, seed, arguments.options);

@@ -15,22 +15,61 @@ Shaft mount(const char* a, const char* b, double stiffness, double damping = 0) 
     return {.name = "mount", .a = a, .b = b, .stiffness = stiffness, .damping = damping};
 }
 
-// ω² = k/J, ζ = d/(2 √(k J)); let go at a twist of 0.1.
+// ω² = k/J, ζ = d/(2 √(k J)); let go at a twist of 0.1. The engine for long chains is of order 4, ωh = 0.02 here.
 TEST(Shaft, ToTheHousingSwingsAsTheClosedFormDoes) {
-    Description d;
-    d.masses = {mass("m", 2)};
-    d.shafts = {mount("m", "", 800, 4)};
-    d.shafts[0].initial_twist = 0.1;
-    Rig rig(d);
-    rig.run(1);
-    const double omega = 20, zeta = 4 / (2 * std::sqrt(800. * 2)),
-                 damped = omega * std::sqrt(1 - zeta * zeta);
-    const double envelope = 0.1 * std::exp(-zeta * omega), phase = damped;
-    EXPECT_NEAR(rig.out("shaft.mount.twist"),
-                envelope * (std::cos(phase) + zeta * omega / damped * std::sin(phase)), 1e-12);
-    EXPECT_NEAR(rig.out("mass.m.speed"), -envelope * omega * omega / damped * std::sin(phase), 1e-11);
-    EXPECT_NEAR(rig.out("energy.defect"), 0, 1e-9);
-    EXPECT_NEAR(rig.out("energy.stored") + rig.out("energy.dissipated"), 0.5 * 800 * 0.01, 1e-9);
+    for (const Method method : {Method::etd3, Method::ark3}) {
+        const bool exact = method == Method::etd3;
+        Description d;
+        d.method = method;
+        d.masses = {mass("m", 2)};
+        d.shafts = {mount("m", "", 800, 4)};
+        d.shafts[0].initial_twist = 0.1;
+        Rig rig(d);
+        rig.run(1);
+        const double omega = 20, zeta = 4 / (2 * std::sqrt(800. * 2)),
+                     damped = omega * std::sqrt(1 - zeta * zeta);
+        const double envelope = 0.1 * std::exp(-zeta * omega), phase = damped;
+        EXPECT_NEAR(rig.out("shaft.mount.twist"),
+                    envelope * (std::cos(phase) + zeta * omega / damped * std::sin(phase)),
+                    exact ? 1e-12 : 1e-7);
+        EXPECT_NEAR(rig.out("mass.m.speed"), -envelope * omega * omega / damped * std::sin(phase),
+                    exact ? 1e-11 : 1e-6);
+        EXPECT_NEAR(rig.out("energy.defect"), 0, exact ? 1e-9 : 1e-6);
+        EXPECT_NEAR(rig.out("energy.stored") + rig.out("energy.dissipated"), 0.5 * 800 * 0.01,
+                    exact ? 1e-9 : 1e-6);
+    }
+}
+
+// More springs than pairs and gears: two masses that have nothing to do with them, and the clutch that closes between them, go
+// their own way. The clutch passes 100 t Nm at most, 110 t Nm locked; a load of 50 Nm tears it loose at once, and it closes when
+// ∫(50 − 2 · 100 t) dt = 0, at 0.5 s.
+TEST(Shaft, ManyToTheHousingLeaveOthersAlone) {
+    for (const Method method : {Method::etd3, Method::ark3}) {
+        for (int mounts = 0; mounts <= 9; ++mounts) {
+            Description d;
+            d.method = method;
+            d.masses = {mass("a", 1), mass("b", 1)};
+            for (int j = 0; j < mounts; ++j) {
+                const std::string name = "m" + std::to_string(j);
+                d.masses.push_back(mass(name, 1));
+                d.shafts.push_back(mount(name.c_str(), "", 1000, 1));
+                d.shafts.back().name += name;
+                d.shafts.back().initial_twist = 0.01;
+            }
+            d.clutches = {
+                clutch("c", "a", "b", 100, 1.1, ActuationDirect{Waveform{{{.from = 0, .slope = 1}}}, 0})};
+            d.sources = {source("b", constant(50))};
+            Rig rig(d);
+            rig.run(1);
+            const auto locks = rig.times(EventKind::lock, "c");
+            ASSERT_FALSE(locks.empty()) << mounts;
+            EXPECT_NEAR(locks.back(), 0.5, 1e-6) << mounts;
+            EXPECT_NEAR(rig.out("mass.a.speed"), 25, 1e-9) << mounts << ' ' << rig.model.engine();
+            EXPECT_NEAR(rig.out("mass.b.speed"), 25, 1e-9) << mounts;
+            EXPECT_LT(std::fabs(rig.out("energy.defect")), 1e-5) << mounts;
+            EXPECT_EQ(rig.fall_backs, 0) << mounts;
+        }
+    }
 }
 
 // A brake on the mass takes what the spring has; a play in place of the spring lets it swing freely between its flanks.
@@ -96,12 +135,13 @@ TEST(Shaft, ToTheHousingHoldsAtTheStartWhatNobodyMoves) {
     EXPECT_NEAR(two.state.speeds()[1], 4, 1e-12);
 }
 
-TEST(Shaft, ToTheHousingIsNotForTheEngineOfLongChains) {
+TEST(Shaft, ToTheHousingWithPlayIsNotForTheEngineOfLongChains) {
     Description d;
     d.masses = {mass("m", 2)};
-    d.shafts = {mount("m", "", 800)};
-    EXPECT_EQ(Model::build(d).engine(), "etd3");
     d.method = Method::ark3;
+    d.shafts = {mount("m", "", 800)};
+    EXPECT_EQ(Model::build(d).engine(), "ark3");
+    d.backlashes = {{.name = "play", .a = "m", .b = "", .stiffness = 500, .damping = 1, .gap = 0.1}};
     EXPECT_THROW(Model::build(d), ModelError);
 }
 
