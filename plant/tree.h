@@ -46,7 +46,9 @@ struct TreeTopology {
         int position = -1, pair = -1;
         double factor = 0;
     };
-    std::vector<int> mass;               // of each position
+    // Behind the positions of the masses those of the *anchors*: the end of each spring to the housing, which hangs on its mass
+    // as if it were one more, but never moves.
+    std::vector<int> mass;               // of each position; of an anchor the one that it hangs on
     std::vector<int> position;           // of each mass
     std::vector<Edge> edges;             // by position
     std::vector<Ground> grounds;         // brakes and resistances
@@ -54,6 +56,8 @@ struct TreeTopology {
     std::vector<double> weight;          // by unknown: share of a torque that is not unique
     bool lossy = false;                  // any gear with losses
     TreeKernel kernel;
+
+    int positions() const noexcept { return static_cast<int>(edges.size()); }
 };
 
 // The topology, or nothing, with `reason` saying which device makes it no forest.

@@ -45,6 +45,7 @@ void find_grounds(const ModelData& m, Mode& mode, TreeMode& t) SHIFTRIG_REALTIME
     const TreeTopology& topology = *m.tree;
     t.ground_count = 0;
     mode.redundant = false;
+    for (int anchor = m.masses; anchor < topology.positions(); ++anchor) t.grounded[t.group[anchor]] = 1;
     std::fill(mode.loop, mode.loop + m.pairs, 0);
     const auto hold = [&](int position, int unknown, double factor) {
         t.ground_position[t.ground_count] = position;

@@ -29,7 +29,7 @@ class Shelf {
 
 // By group or position, within a mode and in a vector of the step.
 int mode_stride(const ModelData& m) {
-    return whole_panels(m.masses + 1);
+    return whole_panels(m.tree->positions() + 1);
 }
 int step_stride(const ModelData& m) {
     return mode_stride(m) + 2 * margin;

@@ -15,7 +15,7 @@ namespace {
 void find_groups(const ModelData& m, const Mode& mode, TreeMode& t) {
     int groups = 0;
     t.edge_count = 0;
-    for (int p = 0; p < m.masses; ++p) {
+    for (int p = 0; p < m.tree->positions(); ++p) {
         const TreeTopology::Edge& edge = m.tree->edges[static_cast<std::size_t>(p)];
         if (is_active(m, mode, edge)) {
             t.group[p] = t.group[edge.parent];
@@ -40,7 +40,7 @@ void weigh_groups(const ModelData& m, const Mode& mode, TreeMode& t) {
     const int groups = t.paths.groups;
     for (double* sum : {t.mass, t.drag, t.drag_loss}) std::fill(sum, sum + groups, 0.);
     int next = t.edge_count;
-    for (int p = 0; p < m.masses; ++p) {
+    for (int p = 0; p < topology.positions(); ++p) {
         const auto i = static_cast<std::size_t>(p);
         const TreeTopology::Edge& edge = topology.edges[i];
         const int g = t.group[p];
@@ -127,7 +127,7 @@ void find_lines(Spreading& s, int count) {
 void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
     const TreeTopology& topology = *m.tree;
     unsigned char* rigid = reinterpret_cast<unsigned char*>(t.network_lower);  // not yet in use
-    std::fill(rigid, rigid + m.masses, static_cast<unsigned char>(0));
+    std::fill(rigid, rigid + topology.positions(), static_cast<unsigned char>(0));
     for (int e = 0; e < t.edge_count; ++e)
         rigid[t.edge[e]] = rigid[topology.edges[static_cast<std::size_t>(t.edge[e])].parent] = 1;
     for (int p = 0; p < m.masses; ++p) {

@@ -6,7 +6,7 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-// Two-link devices as edges between masses.
+// Two-link devices as edges between masses, springs also to the housing (b = −1).
 struct Connection {
     int a = -1, b = -1;
     double factor_a = 1, factor_b = -1;
@@ -76,10 +76,7 @@ class Builder {
         }
         for (std::size_t c = 0; c < connections_.size(); ++c) {
             const Connection& connection = connections_[c];
-            if (connection.b < 0) {
-                reason = "\"" + *connection.name + "\" is a spring to the housing";
-                return false;
-            }
+            if (connection.b < 0) continue;
             const int a = find(connection.a), b = find(connection.b);
             if (a == b) {
                 reason = "\"" + *connection.name + "\" closes a loop";
@@ -99,8 +96,9 @@ class Builder {
         for (std::size_t j = 0; j < n; ++j) {
             if (t->position[j] < 0) place_component(*t, end_of_component(static_cast<int>(j)));
         }
+        place_anchors(*t);
         const Structure& s = model_.structure;
-        t->ground_damping.assign(n, 0.);
+        t->ground_damping.assign(t->edges.size(), 0.);
         for (const Elastic& damper : s.dampers) {
             if (damper.links[1].mass < 0) {
                 t->ground_damping[static_cast<std::size_t>(
@@ -181,6 +179,14 @@ class Builder {
             });
             for (const Neighbour& child : children)
                 stack.push_back({child.mass, visit.mass, child.connection});
+        }
+    }
+
+    void place_anchors(TreeTopology& t) const {
+        for (std::size_t c = 0; c < connections_.size(); ++c) {
+            if (connections_[c].b >= 0) continue;
+            t.mass.push_back(connections_[c].a);
+            t.edges.push_back(edge_to_parent(t, -1, connections_[c].a, c));
         }
     }
 

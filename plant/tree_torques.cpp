@@ -148,14 +148,16 @@ void tree_sample_rate(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALT
     const TreeTopology& topology = *m.tree;
     const TreeMode& t = *mode.tree;
     const GroupState& groups = groups_of(w, mode, s);
-    for (int p = 0; p < m.masses; ++p) {
+    for (int p = 0; p < topology.positions(); ++p) {
         const auto i = static_cast<std::size_t>(p);
         const int mass = topology.mass[i], g = t.group[p];
-        s.rate[mass] = t.ratio[p] * (groups.net[g] * t.inverse_mass[g]);
+        const bool moves = p < m.masses;  // an anchor does not
+        if (moves) s.rate[mass] = t.ratio[p] * (groups.net[g] * t.inverse_mass[g]);
         const TreeTopology::Edge& edge = topology.edges[i];
         if (edge.shaft < 0) continue;
+        const double speed = moves ? s.z[mass] : 0;
         s.rate[m.masses + edge.shaft] =
-            edge.sign * (s.z[mass] - s.z[topology.mass[static_cast<std::size_t>(edge.parent)]]);
+            edge.sign * (speed - s.z[topology.mass[static_cast<std::size_t>(edge.parent)]]);
     }
     std::fill(s.rate + m.states, s.rate + m.states_padded, 0.);
 }
