@@ -223,9 +223,10 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
             if (!begin_known) internal_torques(w, mode, begin);
             begin_known = true;
             const double before = loss_left(w, leader, begin);
-            const double theta = before / (before - left);
-            if (before > 0 && (first.device < 0 || theta < first.theta))
-                first = {m.pairs + leader, theta, Change::limit};
+            // Beyond it already, and nobody took the rest.
+            if (before < -1e-9 * torque_scale(w, begin)) continue;
+            const double theta = std::max(before, 0.) / (std::max(before, 0.) - left);
+            if (first.device < 0 || theta < first.theta) first = {m.pairs + leader, theta, Change::limit};
             continue;
         }
         const double before = std::min(release_drive(w, mode, leader, begin), 0.);

@@ -153,7 +153,7 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
     for (int passes = 0;; ++passes, complete = false) {
         Mode& mode = find_directions(w, w.contact, s, complete);
         if (passes <= most_passes) {
-            if (release_stuck_meshes(w, mode, s) || leave_to_pairs(w, mode, s)) continue;
+            if (release_stuck_meshes(w, mode, s) || leave_to_others(w, mode, s)) continue;
             const Use worst = most_used(w, w.contact, s);
             if (is_overloaded(w, worst.pair, s)) {
                 give_way(w, mode, worst, worst.pair, s);

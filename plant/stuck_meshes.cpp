@@ -227,7 +227,41 @@ bool is_held(const Work& w, int leader, const Sample& s) SHIFTRIG_REALTIME {
     return std::fabs(loss.needed) < (1 - 1e-6) * loss.allowed;
 }
 
-bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+namespace {
+
+// The losses of a motion at rest are told of its leader alone, and may be more than that one can lose as long as the others can
+// lose the rest. To a locked pair between them it matters which: the leader goes to its limit then, and the next of the motion
+// leads. One that is at its limit the other way has to come back from it first.
+bool share_losses(Work& w, const Mode& mode, int leader, double direction, unsigned char at_limit,
+                  const Piece& piece, Sample& s) {
+    const ModelData& m = w.model;
+    const auto between = [&](int k) { return w.contact[k] == locked && piece.holds(k); };
+    int pair = 0;
+    while (pair < m.pairs && !between(pair)) ++pair;
+    if (pair == m.pairs) return false;
+    const signed char* const part = w.scratch.family.data();
+    if (find_family(w, mode, leader, w.scratch.family.data()) == 0) return false;
+    for (const int k : m.lossy_meshes) {
+        unsigned char& state = w.contact[m.pairs + k];
+        if (state == stuck || motion_sign(state) * part[m.pairs + k] * direction >= 0) continue;
+        state = stuck;
+        contact_forces(w, w.contact, s);
+        return true;
+    }
+    unsigned char* const trial = w.scratch.trial.data();
+    std::copy(w.contact, w.contact + m.contact_bytes, trial);
+    trial[m.pairs + leader] = at_limit;
+    contact_forces(w, trial, s);
+    const bool held = find_directions(w, trial, s).bound[m.pairs + leader] != 0;
+    if (held) std::copy(trial, trial + m.contact_bytes, w.contact);
+    contact_forces(w, w.contact, s);
+    if (!held) internal_torques(w, mode, s);
+    return held;
+}
+
+}  // namespace
+
+bool leave_to_others(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     unsigned char* trial = w.scratch.trial.data();
     double size = 0;
@@ -267,17 +301,26 @@ bool leave_to_pairs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         if (taker >= 0) return true;
         internal_torques(w, mode, s);
         if (asked && rearrange(w, -1, device, s) != Rearrangement::none) return true;
+        if (share_losses(w, mode, mesh, direction, moving(direction, x), piece, s)) return true;
     }
     return false;
 }
 
 namespace {
 
+// Several motions of one piece may be at rest, and more meshes than there are motions: which of them go then hangs on all of
+// them together, and a mesh that would go by itself may have to stay.
+bool holds_several(const Work& w, const Mode& mode) {
+    const int first = w.model.pairs + w.model.meshes;
+    return mode.row_count >= 2 && mode.rows[mode.row_count - 2] >= first;
+}
+
 bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
     if (release_drive(w, mode, leader, s) <= 0) return false;
     const ModelData& m = w.model;
     unsigned char* const release = w.scratch.changed.data();  // to tell of it tries again
     std::copy(w.scratch.release.begin(), w.scratch.release.begin() + m.contact_bytes, release);
+    if (holds_several(w, mode) && rearrange(w, -1, m.pairs + leader, s) == Rearrangement::moves) return true;
     LossAtRest* const losses = w.scratch.losses.data();
     for (const int k : m.lossy_meshes) losses[k] = alone(w, k, s);
     family_losses(w, mode, leader, s, losses);

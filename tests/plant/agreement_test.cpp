@@ -170,6 +170,24 @@ TEST(RandomSystems, WithFreewheelsAgreeWithTheReferenceSolver) {
     EXPECT_GE(agreeing, compared - 2);
 }
 
+// In 140 a clutch at rest between four lossy gears is held, in the one mesh that stands for all of them, by more than it could lose.
+TEST(RandomSystems, OnSpringsToTheHousingAgreeWithTheReferenceSolver) {
+    const ComparisonOptions options;
+    const auto check = [&](const RandomSystem& system, std::uint64_t seed) {
+        const RandomSystem mounted = with_mounts(system, seed);
+        const Comparison c = compare(mounted, seed, options);
+        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
+        EXPECT_EQ(name(c.outcome), std::string("agrees"))
+            << "seed " << seed << ": " << c.worst << " tolerances on " << c.worst_signal << " at "
+            << c.worst_time << " s\n"
+            << describe(mounted.description);
+    };
+    for (std::uint64_t seed = 1; seed <= 25; ++seed) check(random_system(seed, options.seconds), seed);
+    check(random_system(140, options.seconds), 140);
+    for (std::uint64_t seed = 1; seed <= 10; ++seed)
+        check(random_system_with_backlashes(seed, options.seconds), seed);
+}
+
 // Closed loops of pairs and lossy meshes at rest, where it takes several devices together to see what moves: two pairs
 // with the mesh between them (3043, 4844), a pair driven back by others that engage (610), a pair that breaks away before another
 // that could hold (203, 521), freewheels whose share of a load has no sign of its own (324, 388, 536, 1492), changes within one step that
