@@ -127,6 +127,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
                 length *= 0.5;
                 continue;
             }
+            if (!place.found) outputs.certificate.flags |= 16;
             reached = place.fraction;
         }
 

@@ -16,7 +16,7 @@ struct RunCertificate {
     double energy_defect = 0;                              // of the whole run [J]
     std::int64_t events = 0, fall_backs = 0, mode_lookups = 0, mode_misses = 0;
     std::int64_t ticks = 0;
-    std::array<std::int64_t, 4> flagged{};  // in so many of them each bit of Certificate::flags is set
+    std::array<std::int64_t, 5> flagged{};  // in so many of them each bit of Certificate::flags is set
 
     void take(const plant::Certificate& tick) SHIFTRIG_REALTIME;
     bool is_finite() const noexcept { return flagged[2] == 0; }

@@ -16,6 +16,9 @@ constexpr Flag flags[] = {
     {"direction_search_gave_up", "no directions of power agreed with the losses"},
     {"not_finite", "the state is not finite: nothing from there on is worth anything"},
     {"coarse", "even the shortest parts of a step are coarse: try a shorter step or a higher maximum_parts"},
+    {"instant_not_found",
+     "the instant of a change was not found, and is wrong by some of the step: try a shorter step or a "
+     "higher maximum_parts"},
 };
 
 }  // namespace

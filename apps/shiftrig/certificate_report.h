@@ -9,8 +9,8 @@
 namespace shiftrig::cli {
 
 // {"torque_residual", "constraint_violation_rad_s", "energy_defect_j", "events", "fall_backs", "mode_lookups", "modes_built",
-// "ticks": {"tie_up", "direction_search_gave_up", "not_finite", "coarse"}}; null for what is not finite, and for `coarse` where
-// the machine's steps are taken whole, whatever happens in them.
+// "ticks": {"tie_up", "direction_search_gave_up", "not_finite", "coarse", "instant_not_found"}}; null for what is not finite, and
+// for `coarse` where the machine's steps are taken whole, whatever happens in them.
 nlohmann::json to_json(const rig::RunCertificate& certificate, const plant::Description& machine);
 
 // One line, and one for each flag that was set in some tick. `dissipated`: in this run [J].

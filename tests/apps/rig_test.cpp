@@ -304,7 +304,7 @@ TEST(Rig, CertificateOfARunKeepsTheWorstAndCountsTheTicksOfEachFlag) {
     EXPECT_EQ(run.torque_residual, 2e-15);
     EXPECT_EQ(run.energy_defect, 2);
     EXPECT_EQ(run.mode_lookups, 4'000'000'000);  // days of them
-    EXPECT_EQ(run.flagged, (std::array<std::int64_t, 4>{1, 0, 0, 2}));
+    EXPECT_EQ(run.flagged, (std::array<std::int64_t, 5>{1, 0, 0, 2, 0}));
     EXPECT_TRUE(run.is_finite());
     tick.flags = 4;
     run.take(tick);

@@ -253,7 +253,7 @@ class Results(InAFolder):
         self.assertGreaterEqual(certificate["events"], 2)  # F3 locks, F2 breaks away
         self.assertGreater(certificate["modes_built"], 2)
         self.assertEqual(certificate["ticks"],
-                         {"tie_up": 0, "direction_search_gave_up": 0, "not_finite": 0, "coarse": None})  # steps are taken whole
+                         {"tie_up": 0, "direction_search_gave_up": 0, "not_finite": 0, "coarse": None, "instant_not_found": 0})  # steps are taken whole
         text = run("--scenario", SHIFT, "--pace", "free").stdout
         self.assertIn("plant     %(events)d events, 0 fall-backs, %(mode_lookups)d mode look-ups, %(modes_built)d modes built; "
                       "torque residual " % certificate, text)
