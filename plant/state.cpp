@@ -63,7 +63,13 @@ Eigen::VectorXd compatible_speeds(const ModelData& m, const Eigen::VectorXd& wan
     // Minimise |√J (ω − wanted)|: the least-norm correction in √J-scaled speeds.
     const Eigen::MatrixXd scaled = c * root.cwiseInverse().asDiagonal();
     const Eigen::VectorXd correction = scaled.completeOrthogonalDecomposition().solve(value - c * wanted);
-    return wanted + root.cwiseInverse().cwiseProduct(correction);
+    Eigen::VectorXd speeds = wanted + root.cwiseInverse().cwiseProduct(correction);
+    // What nothing drives stands, exactly: a wheel that creeps at 1e-16 rad/s would have any slip.
+    const double rounding = 1e-12 * speeds.cwiseAbs().maxCoeff();
+    for (Eigen::Index j = 0; j < n; ++j) {
+        if (wanted(j) == 0 && std::fabs(speeds(j)) < rounding) speeds(j) = 0;
+    }
+    return speeds;
 }
 
 // Actuators at rest at the inputs, auxiliary states as in steady running, contact states by the slip speeds.
@@ -262,11 +268,6 @@ void start(const Model& model, State& state, const Start& start, const Inputs& i
     // A spring to the housing holds nothing rigidly: what is told moves it.
     if (first_missed(speeds) != pinned.end())
         speeds = compatible_speeds(m, rest, locked, true, pinned, false);
-    // What nothing drives stands, exactly: a wheel that creeps at 1e-16 rad/s would have any slip.
-    const double rounding = 1e-12 * speeds.cwiseAbs().maxCoeff();
-    for (double& speed : speeds) {
-        if (std::fabs(speed) < rounding) speed = 0;
-    }
     if (const auto missed = first_missed(speeds); missed != pinned.end())
         throw ModelError("start", m.structure.mass_names[static_cast<std::size_t>(missed->first)], "speeds",
                          "contradicts the other speeds through gears and locked devices");

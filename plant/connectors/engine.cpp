@@ -34,8 +34,9 @@ void check_parameters(const Check& check, const Engine& e) {
 }
 
 void assemble(Assembly& assembly, const Engine& e) {
-    const double friction = engine_friction(e, e.stall_speed);  // the most of a stalled one
-    if (e.stall_speed <= 0 || friction <= 0) return;
+    // The most of a stalled one; without a stall speed it has stalled where it is turned backwards.
+    const double friction = engine_friction(e, e.stall_speed > 0 ? e.stall_speed : e.low_idle);
+    if (friction <= 0) return;
     assembly.structure.pairs.push_back(
         {e.name + ".friction", PairKind::engine_friction, {assembly.link(e.mass, 1), Link{}}, friction});
 }

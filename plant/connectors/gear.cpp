@@ -8,12 +8,24 @@
 
 namespace shiftrig::plant {
 
+namespace {
+
+bool loses_alike(const Gear& g) {
+    return g.efficiency == 1 && (g.backward_efficiency == 0 || g.backward_efficiency == 1);
+}
+
+}  // namespace
+
 void check_parameters(const Check& check, const Gear& g) {
     check.not_zero("ratio", g.ratio);
     check.share("efficiency", g.efficiency);
     if (g.backward_efficiency != 0) check.share("backward_efficiency", g.backward_efficiency);
     check.not_negative("bearing_torque", g.bearing_torque);
     check.any("backward_bearing_torque", g.backward_bearing_torque);
+    // Two lines that never meet: both directions of power would agree with the same torques.
+    if (loses_alike(g) && g.backward_bearing_torque >= 0 && g.backward_bearing_torque != g.bearing_torque)
+        check.fail("backward_bearing_torque", "= " + number(g.backward_bearing_torque) +
+                                                  "; must be bearing_torque where both efficiencies are 1");
     for (const auto& option : g.options) check.not_zero("options", option.second);
 }
 

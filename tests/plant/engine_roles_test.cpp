@@ -244,5 +244,34 @@ TEST(Constraints, DoNotDriftInAMillionStepsAlongTheTree) {
     expect_no_drift(d, "ark3");
 }
 
+// An engine turns its pump; the vehicle stands, joined to them by nothing. Speeds are brought onto the gears all at once, and
+// what stands is to stand exactly: at 1e-25 rad/s its tyre would slip by 1.
+TEST(InitialSpeeds, LeaveWhatStandsAlone) {
+    Description d;
+    d.masses = {mass("engine", 2.6, 94.2477796),
+                mass("pump", 0.255, 50.1317977),
+                mass("axle", 5),
+                mass("wheel", 550),
+                {"body", 14000, Motion::translating, 0}};
+    d.gears = {lossy_gear("pto", "engine", "pump", 1.88, 1, 0),
+               lossy_gear("final", "axle", "wheel", 2.79, 1, 0)};
+    d.tyres = {{.name = "tyre",
+                .wheel = "wheel",
+                .body = "body",
+                .radius = 0.9,
+                .mobility_number = 55,
+                .relaxation_length = 0.6,
+                .slip_damping_time = 0.05,
+                .weight = 137293,
+                .rolling_coefficient = 0.04}};
+    Rig rig(d);
+    EXPECT_EQ(rig.state.speeds()[2], 0);
+    EXPECT_EQ(rig.state.speeds()[3], 0);
+    rig.run(0.05);
+    EXPECT_EQ(rig.out("mass.body.speed"), 0);
+    EXPECT_EQ(rig.out("tyre.tyre.force"), 0);
+    EXPECT_NEAR(rig.out("mass.pump.speed"), 94.2477796 / 1.88, 1e-6);
+}
+
 }  // namespace
 }  // namespace shiftrig::plant

@@ -145,7 +145,7 @@ TEST(EngineInAMachine, BuildsUpItsBoostWhetherItCanStallOrNot) {
         Engine engine = reference_engine();
         engine.name = "diesel";
         engine.mass = "crank";
-        if (!stalls) engine.stall_speed = engine.friction_constant = 0;
+        if (!stalls) engine.stall_speed = engine.friction_constant = engine.friction_per_speed = 0;
         Description d;
         d.name = "engine";
         d.masses = {{"crank", 1e7, Motion::rotating, 1500 * rpm}};
@@ -165,6 +165,32 @@ TEST(EngineInAMachine, BuildsUpItsBoostWhetherItCanStallOrNot) {
             }
         }
         EXPECT_NEAR(outputs.value[load], 1, 3e-3) << (stalls ? "can stall" : "cannot stall");
+    }
+}
+
+// Without a stall speed it has stalled only where something turns it backwards: its friction is there all the same.
+// 2 dω/dt = −(70 + 0.45 ω), from 20 rad/s.
+TEST(EngineInAMachine, TurnedBackwardsIsBrakedByItsFriction) {
+    for (const double stall_speed : {0., 1 * rpm}) {
+        Engine engine = reference_engine();
+        engine.name = "diesel";
+        engine.mass = "crank";
+        engine.stall_speed = stall_speed;
+        engine.friction_constant = 70;
+        engine.friction_per_speed = 0.45;
+        Description d;
+        d.name = "engine";
+        d.masses = {{"crank", 2, Motion::rotating, -20}};
+        d.engines = {engine};
+        const Model model = Model::build(d);
+        Operators operators(model);
+        State state(model);
+        Scratch scratch(model);
+        const Inputs inputs(model);
+        Outputs outputs(model);
+        for (int n = 0; n < 400; ++n) step(model, operators, state, inputs, outputs, scratch);
+        const double limit = 70 / 0.45, left = (20 + limit) * std::exp(-0.45 / 2 * 0.4) - limit;
+        EXPECT_NEAR(state.speeds()[0], -left, 1e-6) << stall_speed;
     }
 }
 

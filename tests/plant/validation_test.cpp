@@ -116,6 +116,22 @@ TEST(Validation, AnEngineFadesBelowWhereItPulls) {
     EXPECT_EQ(refusal(d), "engine \"diesel\": full_load = -10; must be >= 0");
 }
 
+// M_b = −u (M_a η ± b): with η = 1 the lines of both directions are parallel, and between them both agree.
+TEST(Validation, BearingsThatDifferNeedLossesThatTellTheDirections) {
+    Description d;
+    d.masses = {mass("a", 1), mass("b", 1)};
+    d.gears = {lossy_gear("g", "a", "b", 2, 1, 5)};
+    EXPECT_EQ(refusal(d), "");
+    d.gears[0].backward_bearing_torque = 5;
+    EXPECT_EQ(refusal(d), "");
+    d.gears[0].backward_bearing_torque = 1;
+    EXPECT_EQ(
+        refusal(d),
+        "gear \"g\": backward_bearing_torque = 1; must be bearing_torque where both efficiencies are 1");
+    d.gears[0].backward_efficiency = 0.99;
+    EXPECT_EQ(refusal(d), "");
+}
+
 TEST(Validation, OptionsOfGearsCombineToNoMoreThanCanBeLookedAt) {
     Description d;
     d.masses = {mass("m0", 1)};
