@@ -44,7 +44,7 @@ int run(const Options& options) {
     if (options.json) std::cout << list.dump(2) << '\n';
     const std::string incomplete = recorded.incomplete();
     if (incomplete.empty()) return good;
-    std::cerr << incomplete << '\n';
+    tell(incomplete);
     return bad_input;
 }
 

@@ -71,7 +71,7 @@ int run(const Options& options) {
     file.close();
     if (!file) throw std::runtime_error(options.output + ": cannot be written");
     if (!options.json)
-        std::cout << options.output << ": " << card.shifts.size() << " shifts, verdict "
+        std::cout << io::one_line(options.output) << ": " << card.shifts.size() << " shifts, verdict "
                   << analysis::name(card.verdict) << '\n';
     return code;
 }

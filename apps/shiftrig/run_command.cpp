@@ -203,16 +203,16 @@ bool finish(const RunOptions& options, Beside& beside) {
     if (beside.recording) {
         beside.recorded = beside.recording->end();
         whole = beside.recorded.error.empty() && beside.recorded.lost == 0;
-        if (!beside.recorded.error.empty()) std::cerr << beside.recorded.error << '\n';
+        if (!beside.recorded.error.empty()) tell(beside.recorded.error);
         if (beside.recorded.lost > 0)
-            std::cerr << beside.recording_path << ": " << beside.recorded.lost
-                      << " ticks were not kept: the disk did not keep up\n";
+            tell(beside.recording_path + ": " + std::to_string(beside.recorded.lost) +
+                 " ticks were not kept: the disk did not keep up");
     }
     if (!options.csv.empty()) whole = export_csv(beside.recording_path, options.csv) && whole;
     if (beside.trace) {
         std::ofstream file(options.trace);
         beside.trace->write(file);
-        if (!file) std::cerr << options.trace << ": could not be written\n", whole = false;
+        if (!file) tell(options.trace + ": could not be written"), whole = false;
     }
     return whole;
 }

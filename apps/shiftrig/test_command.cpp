@@ -174,8 +174,8 @@ void tell(const analysis::TestResult& result) {
     std::printf("%s %-28s %8.2f s simulated, %7.0f times real time, %d expectations\n",
                 result.passed() ? "ok  " : "FAIL", result.name.c_str(), result.sim_time_s,
                 result.wall_time_s > 0 ? result.sim_time_s / result.wall_time_s : 0, result.expectations);
-    if (!result.error.empty()) std::printf("     %s\n", result.error.c_str());
-    for (const auto& line : result.failures) std::printf("     %s\n", line.c_str());
+    if (!result.error.empty()) std::printf("     %s\n", io::one_line(result.error).c_str());
+    for (const auto& line : result.failures) std::printf("     %s\n", io::one_line(line).c_str());
     std::fflush(stdout);
 }
 
