@@ -93,7 +93,11 @@ Run load_run(const std::string& path, const std::vector<std::string>& signals) {
     }
     std::stable_sort(run.changes.begin(), run.changes.end(),
                      [](const Change& a, const Change& b) { return a.event.time < b.event.time; });
-    if (reader.ending() != io::Ending::complete) run.identity.emplace_back("incomplete", reader.complaint());
+    if (reader.ending() != io::Ending::complete)
+        run.identity.emplace_back("incomplete", reader.complaint());
+    else
+        run.identity.emplace_back("outcome", reader.outcome().empty() ? "unknown" : reader.outcome());
+    run.unfinished = reader.unfinished();
     return run;
 }
 

@@ -51,6 +51,7 @@ nlohmann::json to_json(const io::RecordingReader& reader, const io::ReplayResult
                        {"compared", result.compared},    {"lost", result.lost},
                        {"agrees", result.agrees()},      {"kernel", reader.manifest().kernel},
                        {"complaint", reader.complaint()}};
+    out["outcome"] = reader.outcome().empty() ? nlohmann::json() : nlohmann::json(reader.outcome());
     if (result.first)
         out["first_difference"] = {{"tick", result.first->tick},         {"time_s", result.first->time},
                                    {"signal", result.first->signal},     {"recorded", result.first->recorded},
@@ -129,6 +130,7 @@ int run_on(io::RecordingReader& reader, const Options& options) {
         tell(reader.complaint());
         return bad_input;
     }
+    if (const std::string line = reader.unfinished(); !line.empty()) tell(line);
     return result.agrees() || other_model ? good : failed;
 }
 

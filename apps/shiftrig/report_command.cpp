@@ -53,7 +53,8 @@ int run(const Options& options) {
     const analysis::Scorecard card = analysis::score(run, limits);
     // What can be read is judged; what ended the reading early is told.
     const std::string incomplete = run.incomplete();
-    if (!incomplete.empty()) std::cerr << incomplete << '\n';
+    for (const std::string& line : {incomplete, run.unfinished})
+        if (!line.empty()) tell(line);
     const int code = incomplete.empty() ? good : bad_input;
     if (options.json) print_json(card);
     if (options.output.empty()) return code;
