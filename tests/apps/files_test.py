@@ -246,6 +246,56 @@ class NotWhole(Commands):
             self.assert_refused('stopped.json: run "stopped" did not come to its end (outcome "stopped"); only whole runs are compared',
                                 "compare", *arguments)
         self.assertEqual(self.shiftrig("compare", "whole.json", "whole.json").returncode, 0)
+        # Its recording is sound, and says the same.
+        whole, line = self.recorded(name="whole.lcmlog"), 'u.lcmlog: its run did not come to its end (outcome "stopped")'
+        for arguments in (("u.lcmlog", whole), (whole, "u.lcmlog"), ("u.lcmlog", "whole.json")):
+            self.assert_refused(line + "; only whole runs are compared", "compare", *arguments)
+        for command in (("explain",), ("replay",), ("replay", "--json"), ("report", "--json"), ("report", "-o", "r.html")):
+            done = self.shiftrig(command[0], "u.lcmlog", *command[1:])
+            self.assertEqual((done.returncode, done.stderr), (0, line + "\n"), command)
+            done = self.shiftrig(command[0], whole, *command[1:])
+            self.assertEqual((done.returncode, done.stderr), (0, ""), command)
+        for recording, outcome in (("u.lcmlog", "stopped"), (whole, "completed")):
+            self.assertEqual(json.loads(self.shiftrig("replay", recording, "--json").stdout)["outcome"], outcome)
+
+    def test_a_recording_of_a_run_that_gave_up_is_compared_with_nothing(self):
+        done = self.shiftrig("run", "--scenario", SHIFT, "--factor", "10000", "--catch-up", "0", "--overrun", "abort",
+                             "--record", "u.lcmlog")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assert_refused('u.lcmlog: its run did not come to its end (outcome "too_far_behind"); only whole runs are compared',
+                            "compare", "u.lcmlog", self.recorded(name="whole.lcmlog"))
+
+    def test_runs_that_are_not_whole_are_named_and_the_rest_is_compared(self):
+        for name in ("one", "two", "wrong"):
+            with open(SHIFT) as file, open(self.path(name + ".yaml"), "w") as copy:
+                copy.write(file.read().replace("../tractor.yaml", TRACTOR) + ("colour: red\n" if name == "wrong" else ""))
+        tested = self.shiftrig("test", "one.yaml", "two.yaml", "wrong.yaml", "--json")
+        self.assertEqual(tested.returncode, 2)
+        with open(self.path("before.json"), "w") as file:
+            file.write(tested.stdout)
+        result = json.loads(tested.stdout)
+        result["runs"][0]["loop"]["outcome"] = "too_far_behind"
+        result["runs"][1]["shifts"][0]["duration_s"] *= 2
+        with open(self.path("after.json"), "w") as file:
+            json.dump(result, file)
+        done = self.shiftrig("compare", "before.json", "after.json")
+        unknown = r'run "wrong" could not be judged: wrong\.yaml:\d+:1: colour is not a known key.*\n'
+        self.assertEqual(done.returncode, 2)
+        self.assertRegex(done.stderr, "^before\\.json: " + unknown + 'after\\.json: run "one" did not come to its end '
+                         r'\(outcome "too_far_behind"\); only whole runs are compared\n' + "after\\.json: " + unknown + "$")
+        self.assertRegex(done.stdout, r"^two F2->F3: duration_s .*, worse\n1 shifts compared, 1 differences for the worse; "
+                         r"runs not compared: 2\n$")
+        listed = json.loads(self.shiftrig("compare", "before.json", "after.json", "--json").stdout)
+        self.assertEqual(([d["run"] for d in listed["differences"]], [n["run"] for n in listed["not_compared"]]),
+                         (["two"], ["one", "wrong"]))
+        # Of a folder, too.
+        os.mkdir(self.path("kept"))
+        whole = self.recorded(name="kept/whole.lcmlog")
+        self.cut(whole, 0.4, name="kept/cut.lcmlog")
+        self.cut(whole, 0.001, name="kept/stub.lcmlog")
+        done = self.shiftrig("compare", "kept", "kept")
+        self.assertEqual((done.returncode, done.stdout), (2, "1 shifts compared, 0 differences for the worse; runs not compared: 2\n"))
+        self.assertRegex(done.stderr, r"^(kept/cut\.lcmlog: is cut short after .*\nkept/stub\.lcmlog: is cut short within .*\n){2}$")
 
 
 if __name__ == "__main__":
