@@ -416,6 +416,28 @@ class Results(InAFolder):
         self.assertGreater(len(of_machine["run"]), 3)
         self.assertEqual(of_machine["run"], of_machine["explain"])
 
+    def test_the_benchs_own_events_are_told_of_the_same_time_whoever_tells_them(self):
+        recording, snapshot, table = self.path("run.lcmlog"), self.path("x.snap"), self.path("x.csv")
+        own = lambda events: [e for e in events if e["kind"] in ("safe_command", "commands_return", "message_status")]
+        found = set()
+        for scenario in ("silent_controller", "corrupt_frames", "bus_load_full"):
+            path = f"{CONFIG}/scenarios/{scenario}.yaml"
+            told = own(free("--record", recording, "--csv", table, "--snapshot-at", "2.5", snapshot, scenario=path)["events"])
+            self.assertEqual(own(json.loads(command("explain", recording, "--json").stdout)), told, scenario)
+            found |= {(e["kind"], "bus fault" in e["text"]) for e in told}
+            # The safe command is held over a whole tick: what acts from t on stands in the row of t + 1 ms.
+            with open(table) as file:
+                acts = {round(1000 * float(row["time_s"])) - 1: float(row["rig.safe_command"]) for row in csv.DictReader(file)}
+            for event in told:
+                if event["kind"] != "message_status":
+                    began = round(1000 * event["time_s"])
+                    self.assertEqual((acts[began], acts[began - 1]), (1, 0) if event["kind"] == "safe_command" else (0, 1), event)
+            done = run("--from", snapshot, "--pace", "free", "--json", "--record", recording)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(own(json.loads(command("explain", recording, "--json").stdout)),
+                             own(json.loads(done.stdout)["events"]), scenario)
+        self.assertEqual(found, {("safe_command", False), ("commands_return", False), ("message_status", False), ("message_status", True)})
+
     def test_what_the_solver_says_of_itself_is_no_difference_of_machines(self):
         recording = self.path("shift.lcmlog")
         free("--record", recording)
