@@ -354,6 +354,9 @@ Command::Run declare(CLI::App& app) {
     app.add_flag("--json", options->json, "end with one JSON object on standard output");
     return [options, &app] {
         options->files.check();
+        if (!options->csv.empty() && !options->record.empty() && !keeps_what_is_written(options->record))
+            throw std::invalid_argument("--csv: is made of the recording, which " + options->record +
+                                        " does not keep");
         if (!options->from.empty()) refuse_what_a_snapshot_settles(app, options->choices);
         // Its frames still to come are no part of the assembly.
         if (options->snapshot_at.first >= 0 && !options->choices.can_replay.empty())

@@ -207,6 +207,56 @@ class Outputs(Commands):
         self.assertEqual(sorted(set(os.listdir(self.folder)) - {"p.png"}), ["p.png.svg", "u.lcmlog"], done.stderr)
 
 
+    def test_a_table_goes_straight_into_a_pipe(self):
+        """No file is made beside what has no place of its own: a pipe, a device, a stream of this program."""
+        os.mkdir(self.path("tmp"))
+        there = dict(os.environ, TMPDIR=self.path("tmp"))
+        arguments = [SHIFTRIG, "run", "--scenario", SHIFT, "--pace", "free", "--duration", "0.5", "--csv"]
+        subprocess.run(arguments + ["table.csv"], check=True, capture_output=True, cwd=self.folder)
+        with open(self.path("table.csv")) as file:
+            table = file.read()
+        os.mkdir(self.path("pipes"))
+        os.mkfifo(self.path("pipes/fifo"))
+        writer = subprocess.Popen(arguments + ["pipes/fifo"], stdout=subprocess.DEVNULL, cwd=self.folder, env=there)
+        seen = set()
+        while not os.listdir(self.path("tmp")):  # the recording of which the table is made
+            seen |= set(os.listdir(self.path("pipes")))
+            self.assertIsNone(writer.poll(), seen)
+        with open(self.path("pipes/fifo")) as file:
+            self.assertEqual(file.read(), table)
+        self.assertEqual(writer.wait(), 0)
+        self.assertEqual(seen | set(os.listdir(self.path("pipes"))), {"fifo"})
+        done = subprocess.run(arguments + ["/dev/stdout"], stdout=subprocess.PIPE, text=True, cwd=self.folder, env=there)
+        self.assertEqual((done.returncode, done.stdout[:len(table)] == table), (0, True))
+        done = subprocess.run(arguments + ["/dev/null"], stdout=subprocess.DEVNULL, cwd=self.folder, env=there)
+        self.assertEqual((done.returncode, os.listdir(self.path("tmp"))), (0, []))
+        # A stream that was sent into a file is one: the table is made beside that, not in /dev.
+        with open(self.path("pipes/table"), "w") as file:
+            done = subprocess.run(arguments + ["/dev/fd/%d" % file.fileno()], stdout=subprocess.DEVNULL, cwd=self.folder, env=there,
+                                  pass_fds=[file.fileno()])
+        with open(self.path("pipes/table")) as file:
+            self.assertEqual((done.returncode, file.read() == table), (0, True))
+        os.remove(self.path("pipes/fifo"))
+        self.assert_refused("shiftrig: --csv: is made of the recording, which /dev/null does not keep",
+                            *arguments[1:], "x.csv", "--record", "/dev/null")
+
+    def test_what_is_in_a_name_does_not_break_the_line(self):
+        name, shown = "u\n\x1b[31m.lcmlog", r"u\n\x1b[31m.lcmlog"
+        self.recorded("--duration", "0.5", name=name)
+        os.mkdir(self.path("a\nb"))
+        self.assert_refused(f"--csv {shown}: is the file of RECORDING, which it would overwrite", "export", name, "--csv", name)
+        self.assert_refused(r"--csv q\nr: is the file of --record, too; each needs its own", "run", TRACTOR, "--record", "q\nr", "--csv", "q\nr")
+        self.assert_refused(r"a\nb: cannot be written: Is a directory", "run", TRACTOR, "--record", "a\nb")
+        self.assert_refused(r"shiftrig: scenario no\nne is given twice", "test", "no\nne", "no\nne")
+        cut = self.cut(name, 0.4, name="cut\n.lcmlog")
+        done = self.shiftrig("explain", cut)
+        self.assertRegex(done.stderr, r"^cut\\n\.lcmlog: is cut short.*\n$")
+        done = self.shiftrig("replay", name)
+        self.assertRegex(done.stdout, r"^u\\n\\x1b\[31m\.lcmlog: 500 ticks agree.*\n$")
+        done = self.shiftrig("run", TRACTOR, "a\nb")
+        self.assertEqual((done.returncode, done.stderr.splitlines()[0]), (2, r"The following argument was not expected: a\nb"))
+
+
 class NotWhole(Commands):
     def test_half_a_recording_is_compared_with_nothing(self):
         whole = self.recorded()
