@@ -228,6 +228,11 @@ class Outputs(Commands):
         self.assertEqual(seen | set(os.listdir(self.path("pipes"))), {"fifo"})
         done = subprocess.run(arguments + ["/dev/stdout"], stdout=subprocess.PIPE, text=True, cwd=self.folder, env=there)
         self.assertEqual((done.returncode, done.stdout[:len(table)] == table), (0, True))
+        with open(self.path("table.txt"), "w") as file:  # into which the run's summary goes, too: behind it
+            subprocess.run(arguments + ["/dev/stdout"], check=True, stdout=file, cwd=self.folder, env=there)
+        with open(self.path("table.txt")) as file:
+            text = file.read()
+        self.assertEqual((text[:len(table)] == table, text[len(table):].split(",")[0]), (True, "500 ticks"))
         done = subprocess.run(arguments + ["/dev/null"], stdout=subprocess.DEVNULL, cwd=self.folder, env=there)
         self.assertEqual((done.returncode, os.listdir(self.path("tmp"))), (0, []))
         # A stream that was sent into a file is one: the table is made beside that, not in /dev.
