@@ -80,6 +80,7 @@ class Comparison {
     Comparison(const Limits& limits, const Tolerance& tolerance) : limits_(limits), tolerance_(tolerance) {}
 
     void runs(const std::string& run, const json& before, const json& after) {
+        if (before.is_null() || after.is_null()) return;
         const auto old_shifts = by_label(before), new_shifts = by_label(after);
         for (const auto& [label, shift] : old_shifts) {
             const auto same = new_shifts.find(label);

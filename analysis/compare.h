@@ -1,7 +1,7 @@
 // Two result sets side by side: which shift of which run got worse or better, in what, and by how much.
 //
 // Shifts are matched by run, label and order (the second F2->F3 of a run with the second); where both sets hold a single run, the
-// runs are matched whatever their names.
+// runs are matched whatever their names. Where one of the two has null in place of a run, nothing is said of it (result_set.h).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

@@ -26,7 +26,8 @@ const std::vector<double>& values_of(const io::RecordedTick& tick, io::Table tab
 
 // The rig's own changes, told from its signals, those of `rig.safe_command` and `bus.<message>.status`; kind and words
 // as the rig has them (apps/rig/events.h).
-std::optional<Change> own_change(const std::string& signal, double before, double now, double time) {
+std::optional<Change> own_change(const plant::Signal& changed, double before, double now, double time) {
+    const std::string& signal = changed.name;
     static constexpr std::array statuses = {"never seen", "alive", "late", "lost", "corrupt"};
     char stamp[32];
     std::snprintf(stamp, sizeof stamp, "t=%.7g ", time);
@@ -36,6 +37,11 @@ std::optional<Change> own_change(const std::string& signal, double before, doubl
         change.kind = now != 0 ? "safe_command" : "commands_return";
         change.text = stamp + std::string(now != 0 ? "the controller is silent: the safe command acts"
                                                    : "valid commands are heard again");
+        return change;
+    }
+    if (signal.starts_with("bus.fault.") && signal.ends_with(".status") && now != before) {
+        change.kind = "message_status";
+        change.text = stamp + ("bus fault \"" + changed.description + "\" ") + (now != 0 ? "begins" : "ends");
         return change;
     }
     if (signal.starts_with("bus.") && signal.ends_with(".status") && now != before && now >= 0 &&
@@ -86,14 +92,22 @@ Run load_run(const std::string& path, const std::vector<std::string>& signals) {
                 {event, event.device < 0 ? "" : manifest.devices[static_cast<std::size_t>(event.device)],
                  plant::explain(model, event), std::string(io::name(event.kind)),
                  io::loop_members(event, manifest.devices)});
+        // It acts from the beginning of its tick on: inputs are held over a step.
+        const double begins = 1e-9 * static_cast<double>(tick.sim_time_ns - manifest.tick_ns);
+        if (tick.tick == manifest.first_tick && tick.tick > 0)
+            rig_before = tick.rig;  // goes on from a snapshot
         for (std::size_t i = 0; i < tick.rig.size(); ++i)
-            if (auto change = own_change(manifest.rig[i].name, rig_before[i], tick.rig[i], time))
+            if (auto change = own_change(manifest.rig[i], rig_before[i], tick.rig[i], begins))
                 run.changes.push_back(std::move(*change));
         rig_before = tick.rig;
     }
     std::stable_sort(run.changes.begin(), run.changes.end(),
                      [](const Change& a, const Change& b) { return a.event.time < b.event.time; });
-    if (reader.ending() != io::Ending::complete) run.identity.emplace_back("incomplete", reader.complaint());
+    if (reader.ending() != io::Ending::complete)
+        run.identity.emplace_back("incomplete", reader.complaint());
+    else
+        run.identity.emplace_back("outcome", reader.outcome().empty() ? "unknown" : reader.outcome());
+    run.unfinished = reader.unfinished();
     return run;
 }
 

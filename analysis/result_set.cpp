@@ -32,15 +32,17 @@ std::string run_name(const fs::path& path) {
 // Of half a run, half of what happened is told: what went missing with the rest would pass for better.
 constexpr const char* only_whole = "; only whole runs are compared";
 
-// A result says itself whether its run came to its end and could be judged (`run --json`, `test --json`).
-void require_whole(const json& result, const std::string& where) {
+// A result says itself whether its run came to its end and could be judged (`run --json`, `test --json`): why it is not
+// whole; empty if it is.
+std::string incomplete(const json& result, const std::string& where) {
     if (const auto loop = result.find("loop"); loop != result.end() && loop->is_object()) {
         const std::string outcome = loop->value("outcome", json("completed")).dump();
         if (outcome != "\"completed\"")
-            throw io::InputError(where + " did not come to its end (outcome " + outcome + ")" + only_whole);
+            return where + " did not come to its end (outcome " + outcome + ")" + only_whole;
     }
     if (const auto error = result.find("error"); error != result.end() && error->is_string())
-        throw io::InputError(where + " could not be judged: " + error->get<std::string>());
+        return where + " could not be judged: " + error->get<std::string>();
+    return "";
 }
 
 // Somebody else may have written them: what is compared is held against its kind here.
@@ -69,27 +71,42 @@ void check_shift(const json& shift, const std::string& where) {
     }
 }
 
-class ResultSet {
+class Reader {
   public:
-    explicit ResultSet(const Limits& limits) : limits_(limits) {}
+    explicit Reader(const Limits& limits) : limits_(limits) {}
 
     void read_file(const fs::path& path) {
-        if (io::looks_like_recording(path.string())) {
-            const plant::Description machine =
-                io::recorded_model_file(io::RecordingReader(path.string()).manifest()).description;
-            const Run run = load_run(path.string(), scorecard_signals(machine));
-            if (const auto why = run.incomplete(); !why.empty()) throw io::InputError(why + only_whole);
-            add(run_name(path), to_json(score(run, limits_)), path.string());
-            return;
-        }
+        if (io::looks_like_recording(path.string())) return take_recording(path);
         const json document = json::parse(io::read_text(path.string()), nullptr, false);
         if (document.is_discarded()) throw io::InputError(path.string() + ": neither a recording nor JSON");
         take(document, run_name(path), path.string());
     }
 
-    json runs = json::object();
+    // All that was read. Where nothing of it is whole, the first reason is the answer.
+    ResultSet finish() {
+        const auto is_null = [](const json& run) { return run.is_null(); };
+        if (!set_.runs.empty() && std::all_of(set_.runs.begin(), set_.runs.end(), is_null))
+            throw io::InputError(set_.not_whole.begin()->second);
+        return std::move(set_);
+    }
 
   private:
+    void take_recording(const fs::path& path) {
+        const std::string name = run_name(path), file = path.string();
+        try {
+            const plant::Description machine =
+                io::recorded_model_file(io::RecordingReader(file).manifest()).description;
+            const Run run = load_run(file, scorecard_signals(machine));
+            for (const std::string& why : {run.incomplete(), run.unfinished})
+                if (!why.empty()) return leave_out(name, why + only_whole, file);
+            if (run.outcome() == "unknown")
+                set_.remarks.push_back(file + ": does not say whether its run came to its end (it is of an " +
+                                       "earlier version); compared as if it had");
+            add(name, to_json(score(run, limits_)), file);
+        } catch (const io::RecordingError& error) {  // cut or damaged before its first tick
+            leave_out(name, error.what(), file);
+        }
+    }
     // Adds the runs of one JSON document.
     void take(const json& document, const std::string& name, const std::string& path) {
         if (document.is_array()) {
@@ -101,7 +118,8 @@ class ResultSet {
                 if (document.contains(key) && document[key].is_string())
                     own = run_name(document[key].get<std::string>());
             }
-            require_whole(document, path + ": run \"" + own + "\"");
+            const std::string why = incomplete(document, path + ": run \"" + own + "\"");
+            if (!why.empty()) return leave_out(own, why, path);
             add(own, document["shifts"], path);
         } else if (document.is_object() && document.contains("runs")) {
             take(document["runs"], name, path);
@@ -113,29 +131,38 @@ class ResultSet {
                 ": no \"shifts\" in it; must be a result of run --json or test --json, or a recording");
         }
     }
-    void add(const std::string& name, const json& shifts, const std::string& path) {
+    void require_new(const std::string& name, const std::string& path) {
         const auto [place, is_new] = files_.emplace(name, path);
         if (!is_new)
             throw io::InputError(path + ": run \"" + name + "\" is there already, from " + place->second +
                                  "; runs are told apart by name");
+    }
+    void add(const std::string& name, const json& shifts, const std::string& path) {
+        require_new(name, path);
         for (std::size_t i = 0; i < shifts.size(); ++i)
             check_shift(shifts[i], path + ": run \"" + name + "\", shift " + std::to_string(i + 1));
-        runs[name] = shifts;
+        set_.runs[name] = shifts;
+    }
+    void leave_out(const std::string& name, const std::string& why, const std::string& path) {
+        require_new(name, path);
+        set_.runs[name] = nullptr;
+        set_.not_whole[name] = why;
     }
 
+    ResultSet set_;
     const Limits& limits_;
     std::map<std::string, std::string> files_;  // run → the file it is from
 };
 
 }  // namespace
 
-json read_results(const std::string& path, const Limits& limits) {
-    ResultSet set(limits);
+ResultSet read_results(const std::string& path, const Limits& limits) {
+    Reader reader(limits);
     std::error_code error;
     if (!fs::is_directory(path, error)) {
         if (!fs::exists(path, error)) throw io::InputError(path + ": no such file");
-        set.read_file(path);
-        return std::move(set.runs);
+        reader.read_file(path);
+        return reader.finish();
     }
     std::vector<fs::path> files;
     for (const auto& entry : fs::directory_iterator(path)) {
@@ -147,8 +174,8 @@ json read_results(const std::string& path, const Limits& limits) {
     if (files.empty())
         throw io::InputError(path + ": no recording (*.lcmlog, *.lcmlog.zst) and no *.json in it");
     std::sort(files.begin(), files.end());
-    for (const fs::path& file : files) set.read_file(file);
-    return std::move(set.runs);
+    for (const fs::path& file : files) reader.read_file(file);
+    return reader.finish();
 }
 
 }  // namespace shiftrig::analysis

@@ -31,14 +31,22 @@ struct Run {
     std::vector<Change> changes;
     plant::Description machine;
 
+    // Why it did not come to its end, though its recording is whole (it was stopped, or gave up): one line; empty if it did,
+    // or nothing says so.
+    std::string unfinished;
+
     // Identity for reports: "scenario" → "plough_upshift", "kernel" → "avx2", "build" → …
     std::vector<std::pair<std::string, std::string>> identity;
     std::string model_text;
 
     // Why it is not the whole run (its recording is cut or damaged): one line; empty if it is.
-    std::string incomplete() const {
-        for (const auto& [what, text] : identity)
-            if (what == "incomplete") return text;
+    std::string incomplete() const { return identified("incomplete"); }
+    // Of a whole recording: "completed", "stopped", …; "unknown" where it is of a version that did not say.
+    std::string outcome() const { return identified("outcome"); }
+    // What identity says of it; empty if nothing.
+    std::string identified(std::string_view what) const {
+        for (const auto& [key, text] : identity)
+            if (key == what) return text;
         return "";
     }
 

@@ -6,6 +6,7 @@
 #include "io/field_reader.h"
 #include "io/field_schema.h"
 #include "io/nearest.h"
+#include "io/recording/event_names.h"
 #include "io/scenario_fields.h"
 #include "io/units.h"
 
@@ -161,16 +162,27 @@ void check_signals(const ScenarioFile& scenario, const SignalTable& signals) {
         check(scenario, bound.quantity, bound.quantity.signal, signals);
 }
 
-void check_devices(const ScenarioFile& scenario, const std::vector<std::string>& devices) {
+void check_events(const ScenarioFile& scenario, const plant::Model& model) {
+    const std::vector<std::string>& devices = model.device_names();
     for (const auto& event : scenario.expect.events) {
         const auto refuse = [&](const std::string& what) {
             throw InputError(scenario.path, event.line, event.column, "expect: " + event.kind + what);
         };
         if (event.device.empty()) continue;
         if (event.kind == "safe_command") refuse(" is of no device: it is the bench's own");
-        if (std::find(devices.begin(), devices.end(), event.device) == devices.end())
+        const auto place = std::find(devices.begin(), devices.end(), event.device);
+        if (place == devices.end())
             refuse(" of " + event.device + ": no device of this model has events by that name" +
                    nearest_hint(event.device, devices));
+        std::string told;
+        bool tells_it = false;
+        for (int k = 0; k <= static_cast<int>(plant::EventKind::untold); ++k) {
+            const auto kind = static_cast<plant::EventKind>(k);
+            if (!plant::tells(model, static_cast<std::size_t>(place - devices.begin()), kind)) continue;
+            told += (told.empty() ? "" : ", ") + std::string(name(kind));
+            tells_it = tells_it || name(kind) == event.kind;
+        }
+        if (!tells_it) refuse(" of " + event.device + " never happens; its events are " + told);
     }
 }
 

@@ -29,6 +29,7 @@
 
 #include "io/input_error.h"
 #include "io/signals.h"
+#include "plant/plant.h"
 
 namespace shiftrig::io {
 
@@ -139,9 +140,9 @@ ScenarioFile parse_scenario(const std::string& text, const std::string& path);
 // the place, and the nearest signal or the rule. Masses in start.speeds are checked against `mass.<name>.speed`.
 void check_signals(const ScenarioFile& scenario, const SignalTable& signals);
 
-// Every device whose events the scenario expects is among those that tell events (plant::Model::device_names());
-// throws InputError naming the place and the nearest device.
-void check_devices(const ScenarioFile& scenario, const std::vector<std::string>& devices);
+// Every event that the scenario expects of a device is one that this device ever tells (plant::tells()); throws InputError
+// naming the place, and the nearest device or what it tells.
+void check_events(const ScenarioFile& scenario, const plant::Model& model);
 
 nlohmann::ordered_json scenario_schema();
 

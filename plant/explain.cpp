@@ -44,6 +44,39 @@ std::string rest(const Event& event) {
 
 }  // namespace
 
+bool tells(const Model& model, std::size_t device, EventKind kind) noexcept {
+    const detail::ModelData& m = model.data();
+    const int k = static_cast<int>(device);
+    const FacingHeat* const heat = k < m.pairs ? m.pair_laws[device].heat : nullptr;
+    switch (kind) {
+        case EventKind::lock:
+        case EventKind::break_away:
+        case EventKind::engage:
+        case EventKind::release:
+        case EventKind::tie_up:
+            return k < m.pairs;
+        case EventKind::mesh_sticks:
+        case EventKind::mesh_releases:
+        case EventKind::drive_side:
+            return k >= m.pairs && k < m.first_flank;
+        case EventKind::flank_closes:
+        case EventKind::flank_opens:
+            return k >= m.first_flank && k < m.contact_bytes;
+        case EventKind::engine_stalls:
+        case EventKind::engine_starts:
+            return k >= m.contact_bytes;
+        case EventKind::fall_back:
+            return k < m.contact_bytes;
+        case EventKind::facing_warning:
+            return heat != nullptr && heat->warn_temperature > 0;
+        case EventKind::facing_failure:
+            return heat != nullptr && heat->fail_temperature > 0;
+        case EventKind::untold:
+            return false;
+    }
+    return false;
+}
+
 bool has_margin(EventKind kind) noexcept {
     switch (kind) {
         case EventKind::lock:

@@ -90,6 +90,8 @@ constexpr int most_members = 63;
 // In words: `t=1.2034517 F2 locks: slip 0, torque 812.4 of 2569.3 Nm static`.
 class Model;
 std::string explain(const Model& model, const Event& event);
+// Does this device, as device_names() counts them, ever tell such an event?
+bool tells(const Model& model, std::size_t device, EventKind kind) noexcept;
 
 // Proof of one step, as numbers.
 struct Certificate {

@@ -4,6 +4,20 @@
 
 namespace shiftrig::rt {
 
+const char* name(Outcome outcome) noexcept {
+    switch (outcome) {
+        case Outcome::completed:
+            return "completed";
+        case Outcome::stopped:
+            return "stopped";
+        case Outcome::too_far_behind:
+            return "too_far_behind";
+        case Outcome::late_too_often:
+            return "late_too_often";
+    }
+    return "";
+}
+
 void LoopReport::add(const LoopReport& later) {
     outcome = later.outcome;
     for (std::int64_t LoopReport::*count :

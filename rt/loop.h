@@ -61,6 +61,7 @@ struct Tick {
 };
 
 enum class Outcome { completed, stopped, too_far_behind, late_too_often };
+const char* name(Outcome outcome) noexcept;  // "completed", as written here
 
 struct LoopReport {
     Outcome outcome = Outcome::completed;

@@ -101,7 +101,7 @@ void Rig::begin() {
         const auto& scenario = *setup_.scenario;
         io::check_signals(scenario, signals_);
         check_whole_numbers(scenario);
-        io::check_devices(scenario, model_.device_names());
+        io::check_events(scenario, model_);
         timeline_ = Timeline(scenario, signals_, settable_);
         for (const auto& setting : scenario.start.inputs)
             signals_.value[static_cast<std::size_t>(

@@ -38,12 +38,14 @@ const rt::LoopReport& Session::run() {
     started_ns_ = clock_.now();
     // Paces that can wait lose no tick of the recording.
     const bool waits = options_.recording && options_.loop.pace != rt::Pace::wall;
-    return loop_.run(
+    const rt::LoopReport& report = loop_.run(
         [this, waits](const rt::Tick& t) {
             if (waits) options_.recording->wait_for_room();
             tick(t);
         },
         [this](std::int64_t timeout_ns) { return rig_.wait_for_answer(timeout_ns); });
+    if (options_.recording) options_.recording->came_to(rt::name(report.outcome));
+    return report;
 }
 
 void Session::tick(const rt::Tick& t) SHIFTRIG_REALTIME {

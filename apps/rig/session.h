@@ -19,7 +19,7 @@ namespace shiftrig::rig {
 
 struct SessionOptions {
     rt::LoopSettings loop;                     // period and number of slots are the rig's and the scenario's
-    io::RecordingWriter* recording = nullptr;  // begun by the session, not ended
+    io::RecordingWriter* recording = nullptr;  // begun by the session, and told its outcome; not ended
     Collector* collector = nullptr;
     rt::Trace* trace = nullptr;
     std::map<std::string, std::string> facts;  // said in the recording besides those of manifest_of

@@ -170,12 +170,12 @@ void Dashboard::set_parameter(const std::string& name, double value) {
 }
 
 void Dashboard::tell(const std::string& text) {
-    feed_.change("change", json{{"text", text}}.dump());
+    feed_.change("change", json{{"text", text}}.dump(-1, ' ', false, json::error_handler_t::replace));
 }
 
 void Dashboard::tell_trouble(const std::string& text) {
     tell(text);
-    std::cerr << text << '\n';
+    std::cerr << io::one_line(text) << '\n';
 }
 
 // ---- in the loop ----------------------------------------------------------------------------------------

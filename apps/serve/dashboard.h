@@ -44,6 +44,8 @@ class Dashboard {
     // Runs the loop until stop() is called, its slots are over or it gives up; reports on all stretches.
     rt::LoopReport run();
     void stop();  // from any thread, not from a signal handler
+    // To those who look at the page and to standard error; from any thread.
+    void tell_trouble(const std::string& text);
     // When run() has returned: everything that was to be recorded was, and the plant's state was always finite.
     bool sound() const noexcept { return sound_; }
 
@@ -90,7 +92,6 @@ class Dashboard {
     void begin_recording();
     void end_recording();
     void set_parameter(const std::string& name, double value);
-    void tell_trouble(const std::string& text);
 
     rig::Rig& rig_;
     DashboardOptions options_;

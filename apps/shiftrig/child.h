@@ -3,10 +3,15 @@
 
 #include <sys/types.h>
 
+#include <functional>
 #include <optional>
 #include <string>
 
 namespace shiftrig::cli {
+
+// Throws InputError if `command` begins with what is no program: nothing of that name is there, or it may not be executed. What a
+// shell has to make something of first (quotes, variables, settings) is let through; was_no_program() tells later.
+void require_program(const std::string& command);
 
 class Child {
   public:
@@ -16,8 +21,10 @@ class Child {
     Child(const Child&) = delete;
     Child& operator=(const Child&) = delete;
 
-    // Once, when it has ended by itself: how, in words.
+    // Once, when it has ended by itself: how, in words, in one line.
     std::optional<std::string> ended();
+    // The same, waited for so many seconds, or until `given_up` holds.
+    std::optional<std::string> ends_within(double seconds, const std::function<bool()>& given_up = {});
     // It has ended so, because there is no such program or it is none that can be started.
     bool was_no_program() const noexcept { return no_program_; }
 

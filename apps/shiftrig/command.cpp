@@ -1,6 +1,9 @@
 #include "apps/shiftrig/command.h"
 
 #include <algorithm>
+#include <iostream>
+
+#include "io/input_error.h"
 
 namespace shiftrig::cli {
 
@@ -13,6 +16,10 @@ std::vector<Command>& registry() {
 }
 
 }  // namespace
+
+void tell(const std::string& line) {
+    std::cerr << io::one_line(line) << '\n';
+}
 
 Command::Command(std::string name_, std::string summary_, Declare declare_)
     : name(std::move(name_)), summary(std::move(summary_)), declare(declare_) {

@@ -22,6 +22,9 @@ enum ExitCode : int {
     bad_input = 2,  // wrong usage or bad input
 };
 
+// To standard error, in one line whatever names are in it.
+void tell(const std::string& line);
+
 struct Command {
     using Run = std::function<int()>;
     using Declare = Run (*)(CLI::App& app);

@@ -42,9 +42,10 @@ int run(const Options& options) {
         list.push_back(analysis::to_json(change));
     }
     if (options.json) std::cout << list.dump(2) << '\n';
+    if (!recorded.unfinished.empty()) tell(recorded.unfinished);
     const std::string incomplete = recorded.incomplete();
     if (incomplete.empty()) return good;
-    std::cerr << incomplete << '\n';
+    tell(incomplete);
     return bad_input;
 }
 

@@ -28,9 +28,9 @@ int export_to(const Options& options, const std::string& path, Export write) {
     if (write == io::export_candump)
         options.files.check(files_of(io::recorded_model_file(reader.manifest())));
     const std::int64_t ticks = write(reader, path);
-    if (path != "-") std::cerr << path << ": " << ticks << " ticks\n";
+    if (path != "-") tell(path + ": " + std::to_string(ticks) + " ticks");
     if (reader.ending() == io::Ending::complete) return good;
-    std::cerr << reader.complaint() << '\n';
+    tell(reader.complaint());
     return bad_input;
 }
 

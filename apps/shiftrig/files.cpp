@@ -128,10 +128,23 @@ void Files::check(const std::vector<NamedFile>& also_read, const std::vector<Nam
     for (const auto& output : before) require_writable(output.path);
 }
 
-PassingFile::PassingFile(const std::string& neighbour, const std::string& ending)
-    : path_(neighbour + ".XXXXXX" + ending) {
+bool keeps_what_is_written(const std::string& path) {
+    struct stat info = {};
+    return stat(path.c_str(), &info) != 0 || S_ISREG(info.st_mode);
+}
+
+PassingFile::PassingFile(const std::string& neighbour, const std::string& ending) {
+    // Links are followed: that of /dev/stdout may lead to a file, which need not have a name any more.
+    const fs::path place = place_of(neighbour);
+    std::error_code none;
+    const bool has_a_place =
+        keeps_what_is_written(neighbour) && (fs::exists(place, none) || !fs::exists(neighbour, none));
+    const std::string name = has_a_place ? place.string() : (fs::temp_directory_path() / "shiftrig").string();
+    path_ = name + ".XXXXXX" + ending;
     const int file = mkstemps(path_.data(), static_cast<int>(ending.size()));
-    if (file < 0) throw io::InputError(neighbour + ": cannot be written: " + std::strerror(errno));
+    if (file < 0)
+        throw io::InputError((has_a_place ? neighbour : name) +
+                             ": cannot be written: " + std::strerror(errno));
     close(file);
 }
 

@@ -36,7 +36,11 @@ class Files {
     std::vector<Marked> read_, written_;
 };
 
-// A file for the time being: beside `neighbour`, under a name that nobody has, gone with this object however that ends.
+// Can what is written there be read again? Not from a pipe, a terminal, /dev/null.
+bool keeps_what_is_written(const std::string& path);
+
+// A file for the time being: beside `neighbour`, under a name that nobody has, gone with this object however that ends. Where
+// `neighbour` is no file that has a place (a pipe, a device, a standard stream), in the folder for temporary files.
 class PassingFile {
   public:
     PassingFile(const std::string& neighbour, const std::string& ending);

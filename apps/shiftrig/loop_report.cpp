@@ -2,20 +2,6 @@
 
 namespace shiftrig::cli {
 
-const char* name(rt::Outcome outcome) {
-    switch (outcome) {
-        case rt::Outcome::completed:
-            return "completed";
-        case rt::Outcome::stopped:
-            return "stopped";
-        case rt::Outcome::too_far_behind:
-            return "too_far_behind";
-        case rt::Outcome::late_too_often:
-            return "late_too_often";
-    }
-    return "";
-}
-
 nlohmann::json to_json(const rt::Histogram& histogram) {
     return {{"count", histogram.count()},
             {"min", histogram.minimum()},
@@ -28,7 +14,7 @@ nlohmann::json to_json(const rt::Histogram& histogram) {
 }
 
 nlohmann::json to_json(const rt::LoopReport& report) {
-    return {{"outcome", name(report.outcome)},
+    return {{"outcome", rt::name(report.outcome)},
             {"executed", report.executed},
             {"skipped", report.skipped},
             {"late", report.late},
@@ -62,7 +48,7 @@ std::string describe(const rt::LoopReport& report) {
     if (report.unanswered) text += ", " + std::to_string(report.unanswered) + " unanswered";
     if (report.clock_reversals)
         text += ", clock went back " + std::to_string(report.clock_reversals) + " times";
-    if (report.outcome != rt::Outcome::completed) text += "; " + std::string(name(report.outcome));
+    if (report.outcome != rt::Outcome::completed) text += "; " + std::string(rt::name(report.outcome));
     text += "\n";
     const auto line = [&text](const char* label, const rt::Histogram& histogram) {
         if (histogram.count()) text += label + histogram.percentiles() + "\n";
@@ -76,7 +62,8 @@ std::string describe(const rt::LoopReport& report) {
 
 std::string gave_up(const rt::LoopReport& report) {
     if (report.outcome == rt::Outcome::completed || report.outcome == rt::Outcome::stopped) return "";
-    return "the loop gave up after " + std::to_string(report.executed) + " ticks: " + name(report.outcome);
+    return "the loop gave up after " + std::to_string(report.executed) +
+           " ticks: " + rt::name(report.outcome);
 }
 
 }  // namespace shiftrig::cli

@@ -9,9 +9,6 @@
 
 namespace shiftrig::cli {
 
-// "completed", "stopped", "too_far_behind", "late_too_often"
-const char* name(rt::Outcome outcome);
-
 // {"outcome", "executed", "skipped", "late", …, "wake_up_ns": {"p50", "p90", "p99", "p99_9", "max", "count"},
 // …}
 nlohmann::json to_json(const rt::LoopReport& report);

@@ -42,7 +42,9 @@ int run_program(int argc, char** argv) {
     // A value that breaks a rule takes one line; wrong usage is pointed to the help.
     app.failure_message([](const CLI::App* command, const CLI::Error& error) {
         const bool is_value = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ValidationError);
-        return is_value ? std::string(error.what()) + '\n' : CLI::FailureMessage::simple(command, error);
+        const std::string line = error.what();
+        const std::string help = CLI::FailureMessage::simple(command, error).substr(line.size());
+        return io::one_line(line) + (is_value ? "\n" : help);
     });
     app.footer("Exit codes: 0 good, 1 the check or test failed, 2 wrong usage or bad input.");
 
@@ -60,9 +62,9 @@ int run_program(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? cli::good : cli::bad_input;
     } catch (const io::InputError& error) {  // names its place itself
-        std::cerr << error.what() << '\n';
+        cli::tell(error.what());
     } catch (const std::exception& error) {
-        std::cerr << "shiftrig: " << error.what() << '\n';
+        cli::tell(std::string("shiftrig: ") + error.what());
     }
     return cli::bad_input;
 }

@@ -94,7 +94,7 @@ int run(const Options& options) {
     // What can be read is drawn; what ended the reading early is told.
     const std::string incomplete = run.incomplete();
     if (incomplete.empty()) return good;
-    std::cerr << incomplete << '\n';
+    tell(incomplete);
     return bad_input;
 }
 

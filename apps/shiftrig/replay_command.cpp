@@ -51,6 +51,7 @@ nlohmann::json to_json(const io::RecordingReader& reader, const io::ReplayResult
                        {"compared", result.compared},    {"lost", result.lost},
                        {"agrees", result.agrees()},      {"kernel", reader.manifest().kernel},
                        {"complaint", reader.complaint()}};
+    out["outcome"] = reader.outcome().empty() ? nlohmann::json() : nlohmann::json(reader.outcome());
     if (result.first)
         out["first_difference"] = {{"tick", result.first->tick},         {"time_s", result.first->time},
                                    {"signal", result.first->signal},     {"recorded", result.first->recorded},
@@ -88,16 +89,17 @@ void print_deviations(const io::RecordingReader& reader, std::vector<io::Deviati
 }
 
 void print(const io::RecordingReader& reader, const io::ReplayResult& result, const Options& options) {
+    const std::string path = io::one_line(reader.path());
     if (result.first) {
         const io::Difference& d = *result.first;
-        std::printf("%s: tick %lld (t=%.7g s): %s: recorded %s, %s %s\n", reader.path().c_str(),
+        std::printf("%s: tick %lld (t=%.7g s): %s: recorded %s, %s %s\n", path.c_str(),
                     static_cast<long long>(d.tick), d.time, d.signal.c_str(), d.recorded.c_str(),
                     d.damaged ? "written as" : "replayed", d.replayed.c_str());
         return;
     }
     const std::string how = options.tolerance > 0 ? " within the tolerance" : " bit for bit";
-    std::printf("%s: %lld ticks agree%s (kernel %s)\n", reader.path().c_str(),
-                static_cast<long long>(result.compared), how.c_str(), reader.manifest().kernel.c_str());
+    std::printf("%s: %lld ticks agree%s (kernel %s)\n", path.c_str(), static_cast<long long>(result.compared),
+                how.c_str(), reader.manifest().kernel.c_str());
     if (result.compared < result.ticks || result.lost > 0)
         std::printf("%lld ticks are missing in the recording; %lld could not be compared for that\n",
                     static_cast<long long>(result.lost),
@@ -125,9 +127,10 @@ int run_on(io::RecordingReader& reader, const Options& options) {
     // A difference found is the answer; a log that cannot be read to its end is bad input.
     if (result.first && !other_model) return failed;
     if (reader.ending() != io::Ending::complete) {
-        std::cerr << reader.complaint() << '\n';
+        tell(reader.complaint());
         return bad_input;
     }
+    if (const std::string line = reader.unfinished(); !line.empty()) tell(line);
     return result.agrees() || other_model ? good : failed;
 }
 
@@ -178,8 +181,8 @@ int run_field(const Options& options) {
     for (const auto& held : options.held) hold_input(held, model, recording);
     const io::FieldFit fit = io::replay_field(recording, model, options.locked);
     for (const auto& column : fit.limited)
-        std::cerr << options.recording << ": " << column.written << " " << column.rule << "; limited in "
-                  << column.rows << " of " << recording.time.size() << " rows\n";
+        tell(options.recording + ": " + column.written + " " + column.rule + "; limited in " +
+             std::to_string(column.rows) + " of " + std::to_string(recording.time.size()) + " rows");
     if (options.json) {
         nlohmann::json out{{"driven", fit.driven},
                            {"ignored", fit.ignored},
@@ -205,7 +208,7 @@ int run_field(const Options& options) {
                     std::string(plant::symbol(f.unit)).c_str(), f.rms, f.worst, f.worst_time, f.simulated,
                     f.measured);
     for (const auto& column : fit.ignored)
-        std::cerr << options.recording << ": column " << column << " is no signal of the model\n";
+        tell(options.recording + ": column " + column + " is no signal of the model");
     return good;
 }
 

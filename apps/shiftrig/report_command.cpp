@@ -53,7 +53,8 @@ int run(const Options& options) {
     const analysis::Scorecard card = analysis::score(run, limits);
     // What can be read is judged; what ended the reading early is told.
     const std::string incomplete = run.incomplete();
-    if (!incomplete.empty()) std::cerr << incomplete << '\n';
+    for (const std::string& line : {incomplete, run.unfinished})
+        if (!line.empty()) tell(line);
     const int code = incomplete.empty() ? good : bad_input;
     if (options.json) print_json(card);
     if (options.output.empty()) return code;
@@ -71,7 +72,7 @@ int run(const Options& options) {
     file.close();
     if (!file) throw std::runtime_error(options.output + ": cannot be written");
     if (!options.json)
-        std::cout << options.output << ": " << card.shifts.size() << " shifts, verdict "
+        std::cout << io::one_line(options.output) << ": " << card.shifts.size() << " shifts, verdict "
                   << analysis::name(card.verdict) << '\n';
     return code;
 }

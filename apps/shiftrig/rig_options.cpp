@@ -62,6 +62,12 @@ void RigOptions::add_common_to(CLI::App& app, const std::string& usual_pace) {
                "processors the plant thread may run on");
 }
 
+void RigOptions::add_controller_start_to(CLI::App& app) {
+    add_number(app, "--controller-start", controller_start_s, {0, 3600},
+               "seconds a command given as --controller has to get ready")
+        ->capture_default_str();
+}
+
 rt::Pace RigOptions::pacing() const {
     return pace == "wall" ? rt::Pace::wall : pace == "lockstep" ? rt::Pace::lockstep : rt::Pace::free;
 }

@@ -28,6 +28,7 @@ struct RigOptions {
     std::int64_t late_limit = 0;       // [ticks in a row]; 0: none
     std::string when_late = "record";  // record, skip, abort
     double answer_timeout_s = 1;       // lockstep
+    double controller_start_s = 1;     // of a command given as --controller, for those that give it time
     int priority = 80;                 // FIFO; 0: none
     std::vector<int> processors;
     std::int64_t rehearsal = 60'000;  // [ticks] at most; 0: none
@@ -35,6 +36,8 @@ struct RigOptions {
     void add_to(CLI::App& app);
     // Everything but MODEL, --scenario and --duration, for commands that bring those themselves.
     void add_common_to(CLI::App& app, const std::string& usual_pace = "wall");
+    // Only where a command that is started as the controller is waited for; what was chosen before is the default.
+    void add_controller_start_to(CLI::App& app);
     // Of the loop of a rig built from `choices`.
     rt::LoopSettings loop(const rig::Setup& setup) const;
     // Once it is known what the rig's files name themselves: nothing that is written is one of those either.

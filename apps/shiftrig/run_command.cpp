@@ -37,7 +37,6 @@ namespace {
 
 struct RunOptions : RigOptions {
     std::string record, csv, trace;
-    double controller_start_s = 1;
     std::pair<double, std::string> snapshot_at{-1, ""};  // time [s], file
     std::string from;                                    // snapshot to go on from
     bool json = false;
@@ -76,34 +75,39 @@ void check_snapshot_time(double at_s, const rig::Rig& rig, std::int64_t slots) {
     if (at > rig.ticks() + slots) refuse("ends at", rig.ticks() + slots);
 }
 
+std::atomic<bool> asked_to_stop{false};
 std::atomic<rt::LoopControl*> running{nullptr};
 
 void on_signal(int) {
+    asked_to_stop = true;
     if (rt::LoopControl* control = running.load()) control->stop();
 }
 
+void catch_ending_signals() {
+    struct sigaction action = {};
+    action.sa_handler = on_signal;
+    for (const int signal : ending_signals()) sigaction(signal, &action, nullptr);
+}
+
+// Signals end this loop, also those that came before it.
 class SignalsStop {
   public:
     explicit SignalsStop(rt::LoopControl& control) {
         running = &control;
-        struct sigaction action = {};
-        action.sa_handler = on_signal;
-        for (const int signal : ending_signals()) sigaction(signal, &action, nullptr);
+        if (asked_to_stop) control.stop();
     }
     ~SignalsStop() { running = nullptr; }
 };
 
-// Gives the controller its time, unless the run is over before it began. False if it turns out to be no program.
-bool get_ready(const RunOptions& options, const rt::LoopControl& control, Child& controller) {
-    using Clock = std::chrono::steady_clock;
-    const auto begin = Clock::now() + std::chrono::duration<double>(options.controller_start_s);
-    while (Clock::now() < begin && !control.stopping()) {
-        std::this_thread::sleep_for(
-            std::min<std::chrono::duration<double>>(begin - Clock::now(), std::chrono::milliseconds(20)));
-        if (const auto how = controller.ended()) std::cerr << *how << '\n';
-        if (controller.was_no_program()) return false;
-    }
-    return true;
+// Starts the controller and gives it its time, unless the run is over before it began. False if it turns out to be no program.
+bool get_ready(const RunOptions& options, std::optional<Child>& controller) {
+    const auto command = rig::controller_command(options.choices);
+    if (command.empty()) return true;
+    controller.emplace(command);
+    if (const auto how =
+            controller->ends_within(options.controller_start_s, [] { return asked_to_stop.load(); }))
+        std::cerr << *how << '\n';
+    return !controller->was_no_program();
 }
 
 // What the session needs beside the rig, and what is left of it afterwards.
@@ -203,16 +207,16 @@ bool finish(const RunOptions& options, Beside& beside) {
     if (beside.recording) {
         beside.recorded = beside.recording->end();
         whole = beside.recorded.error.empty() && beside.recorded.lost == 0;
-        if (!beside.recorded.error.empty()) std::cerr << beside.recorded.error << '\n';
+        if (!beside.recorded.error.empty()) tell(beside.recorded.error);
         if (beside.recorded.lost > 0)
-            std::cerr << beside.recording_path << ": " << beside.recorded.lost
-                      << " ticks were not kept: the disk did not keep up\n";
+            tell(beside.recording_path + ": " + std::to_string(beside.recorded.lost) +
+                 " ticks were not kept: the disk did not keep up");
     }
     if (!options.csv.empty()) whole = export_csv(beside.recording_path, options.csv) && whole;
     if (beside.trace) {
         std::ofstream file(options.trace);
         beside.trace->write(file);
-        if (!file) std::cerr << options.trace << ": could not be written\n", whole = false;
+        if (!file) tell(options.trace + ": could not be written"), whole = false;
     }
     return whole;
 }
@@ -248,6 +252,8 @@ void print_summary(const rig::Rig& rig, const rig::Session& session, double diss
 }
 
 int run(const RunOptions& options) {
+    if (const auto command = rig::controller_command(options.choices); !command.empty())
+        require_program(command);
     const auto owned = make_rig(options);
     rig::Rig& rig = *owned;
     for (const auto& warning : rig.buses().warnings()) std::cerr << warning << '\n';
@@ -267,6 +273,10 @@ int run(const RunOptions& options) {
         check_snapshot_time(options.snapshot_at.first, rig, loop.slots);
         taker.emplace(rig, options.snapshot_at.first);
     }
+    // Only now are files opened for writing: what a run that does not begin would have replaced stays.
+    catch_ending_signals();
+    std::optional<Child> controller;
+    if (!get_ready(options, controller)) return bad_input;
     Beside beside = prepare(options, rig, loop);
     LiveLine live(rig);
 
@@ -286,13 +296,8 @@ int run(const RunOptions& options) {
     rig::Session session(rig, std::move(session_options));
     const double dissipated_before = dissipated(rig);
 
-    std::optional<Child> controller;
     {
         const SignalsStop signals_stop(session.control());
-        if (const auto command = rig::controller_command(options.choices); !command.empty()) {
-            controller.emplace(command);
-            if (!get_ready(options, session.control(), *controller)) return bad_input;
-        }
         run_loop(session, options, live, controller ? &*controller : nullptr, unanswered);
     }
     const bool controlled = !controller || !controller->was_no_program();
@@ -345,12 +350,13 @@ Command::Run declare(CLI::App& app) {
     files.read(app.add_option("--can-replay", options->choices.can_replay,
                               "candump log that takes the controller's place, at its own times"));
     files.written(app.add_option("--trace", options->trace, "what the loop did when, for ui.perfetto.dev"));
-    add_number(app, "--controller-start", options->controller_start_s, {0, 3600},
-               "seconds a command given as --controller has to get ready")
-        ->capture_default_str();
+    options->add_controller_start_to(app);
     app.add_flag("--json", options->json, "end with one JSON object on standard output");
     return [options, &app] {
         options->files.check();
+        if (!options->csv.empty() && !options->record.empty() && !keeps_what_is_written(options->record))
+            throw std::invalid_argument("--csv: is made of the recording, which " + options->record +
+                                        " does not keep");
         if (!options->from.empty()) refuse_what_a_snapshot_settles(app, options->choices);
         // Its frames still to come are no part of the assembly.
         if (options->snapshot_at.first >= 0 && !options->choices.can_replay.empty())

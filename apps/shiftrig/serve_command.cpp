@@ -1,4 +1,6 @@
 // shiftrig serve: the rig with its live dashboard.
+#include <atomic>
+#include <chrono>
 #include <csignal>
 #include <iostream>
 #include <memory>
@@ -51,6 +53,8 @@ class SignalsStop {
 };
 
 int run(const Options& options) {
+    const std::string controller_command = rig::controller_command(options.choices);
+    if (!controller_command.empty()) require_program(controller_command);
     const sigset_t ends = set_of(ending_signals());
     pthread_sigmask(SIG_BLOCK, &ends, nullptr);
 
@@ -73,26 +77,33 @@ int run(const Options& options) {
     std::cout << "dashboard: " << dashboard.url() << std::endl;
 
     std::optional<Child> controller;
-    if (const auto command = rig::controller_command(options.choices); !command.empty())
-        controller.emplace(command);
+    if (!controller_command.empty()) controller.emplace(controller_command);
 
     rt::AwakeProcessors awake;
     rt::Refusals refusals = prepare_process(options, awake);
     rt::LoopReport report;
+    std::atomic<bool> done{false};
     {
         const SignalsStop signals_stop(dashboard);
         std::thread plant([&] {
             for (auto& refusal : prepare_thread(options)) refusals.push_back(std::move(refusal));
             report = dashboard.run();
+            done = true;
         });
+        while (!done) {  // as in `run` the machine goes on without its controller
+            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+            if (!controller) continue;
+            if (const auto how = controller->ended()) dashboard.tell_trouble(*how);
+        }
         plant.join();
     }
+    const bool controlled = !controller || !controller->was_no_program();
     controller.reset();
     for (const auto& refusal : refusals)
         std::cerr << "this machine does not grant " << rt::to_string(refusal) << '\n';
     for (const auto& line : rig.buses().summary()) std::cerr << line << '\n';
     std::cout << describe(report);
-    return gave_up(report).empty() && dashboard.sound() ? good : failed;
+    return gave_up(report).empty() && dashboard.sound() && controlled ? good : failed;
 }
 
 Command::Run declare(CLI::App& app) {

@@ -84,6 +84,16 @@ std::vector<std::string> broken_run(const std::string& path, const rig::Session&
     return why;
 }
 
+// Why a recording, asked for, is not all of its run: a failure, too.
+std::vector<std::string> broken_recording(const std::string& path, const io::RecordingSummary& recorded) {
+    std::vector<std::string> why;
+    if (!recorded.error.empty()) why.push_back(recorded.error);
+    if (recorded.lost > 0)
+        why.push_back(path + ": " + std::to_string(recorded.lost) +
+                      " ticks were not recorded: the disk did not keep up");
+    return why;
+}
+
 // What the judgement would have to do without; empty if nothing.
 std::string left_out(const rig::Collector& collector) {
     if (const auto ticks = collector.ticks_left_out(); ticks > 0)
@@ -107,6 +117,26 @@ std::vector<std::size_t> by_duration(const std::vector<Case>& cases) {
     return order;
 }
 
+// The run, with a program as its controller. If that ends first there is nothing left to be tested, and the run is over: how
+// it ended.
+std::optional<std::string> run_with(Child& controller, rig::Session& session) {
+    std::optional<std::string> ended;
+    std::atomic<bool> done{false};
+    std::thread watch([&] {
+        for (bool last = false; !ended && !last;) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+            last = done;
+            ended = controller.ended();
+        }
+        session.control().stop();
+    });
+    session.run();
+    done = true;
+    watch.join();
+    const bool came_first = session.report().outcome == rt::Outcome::stopped || controller.was_no_program();
+    return came_first ? ended : std::nullopt;
+}
+
 Outcome run_one(const Options& options, const analysis::Limits& limits, const Case& each) {
     Outcome result;
     result.file = result.name = each.path;
@@ -122,6 +152,22 @@ Outcome run_one(const Options& options, const analysis::Limits& limits, const Ca
         choices.lockstep = options.pacing() == rt::Pace::lockstep;
         rig::Rig rig(rig::make_setup(choices, scenario));
         const rt::LoopSettings loop = options.loop(rig.setup());
+        std::optional<Child> controller;
+        const auto tell_end = [&](const std::string& how) {
+            if (controller->was_no_program())
+                result.error = path + ": " + how;
+            else
+                result.failures.push_back(path + ": after " + io::in_digits(rig.sim_time()) + " s of " +
+                                          io::in_digits(scenario.duration) + " s its " + how);
+        };
+        if (const auto command = rig::controller_command(options.choices); !command.empty()) {
+            controller.emplace(command);
+            if (const auto how = controller->ends_within(options.controller_start_s)) {
+                result.outcome = rt::name(rt::Outcome::stopped);
+                tell_end(*how);
+                return result;
+            }
+        }
 
         rig::CollectorOptions keep;
         keep.only = read_signals(rig);
@@ -137,16 +183,15 @@ Outcome run_one(const Options& options, const analysis::Limits& limits, const Ca
             session_options.recording = &*recording;
         }
         rig::Session session(rig, std::move(session_options));
-        std::optional<Child> controller;
-        if (const auto command = rig::controller_command(options.choices); !command.empty())
-            controller.emplace(command);
-        session.run();
+        std::optional<std::string> ended;
         if (controller)
-            if (const auto how = controller->ended(); how && controller->was_no_program())
-                result.error = path + ": " + *how;
+            ended = run_with(*controller, session);
+        else
+            session.run();
         result.sim_time_s = rig.sim_time();
-        result.outcome = name(session.report().outcome);
+        result.outcome = rt::name(session.report().outcome);
         result.failures = broken_run(path, session);
+        if (ended) tell_end(*ended);
         if (const auto missing = left_out(collector); !missing.empty()) result.error = path + ": " + missing;
         if (result.error.empty() && result.failures.empty()) {
             const analysis::Run run = collector.finish(rig);
@@ -157,11 +202,8 @@ Outcome run_one(const Options& options, const analysis::Limits& limits, const Ca
                 result.failures.push_back(path + ": expects nothing, so it tests nothing");
         }
         if (recording) {
-            const io::RecordingSummary recorded = recording->end();
-            if (!recorded.error.empty()) result.failures.push_back(recorded.error);
-            if (recorded.lost > 0)
-                result.failures.push_back(path + ": " + std::to_string(recorded.lost) +
-                                          " ticks were not recorded: the disk did not keep up");
+            for (auto& line : broken_recording(path, recording->end()))
+                result.failures.push_back(std::move(line));
         }
     } catch (const std::exception& error) {
         result.error = error.what();
@@ -174,8 +216,8 @@ void tell(const analysis::TestResult& result) {
     std::printf("%s %-28s %8.2f s simulated, %7.0f times real time, %d expectations\n",
                 result.passed() ? "ok  " : "FAIL", result.name.c_str(), result.sim_time_s,
                 result.wall_time_s > 0 ? result.sim_time_s / result.wall_time_s : 0, result.expectations);
-    if (!result.error.empty()) std::printf("     %s\n", result.error.c_str());
-    for (const auto& line : result.failures) std::printf("     %s\n", line.c_str());
+    if (!result.error.empty()) std::printf("     %s\n", io::one_line(result.error).c_str());
+    for (const auto& line : result.failures) std::printf("     %s\n", io::one_line(line).c_str());
     std::fflush(stdout);
 }
 
@@ -226,6 +268,8 @@ void check_files(const Options& options) {
 }
 
 int run(const Options& options) {
+    if (const auto command = rig::controller_command(options.choices); !command.empty())
+        require_program(command);
     check_files(options);
     const analysis::Limits limits =
         options.limits.empty() ? analysis::default_limits() : analysis::read_limits(options.limits);
@@ -287,6 +331,8 @@ int run(const Options& options) {
 Command::Run declare(CLI::App& app) {
     auto options = std::make_shared<Options>();
     options->add_common_to(app, "free");
+    options->controller_start_s = 0.2;  // lockstep waits for its first answer anyway
+    options->add_controller_start_to(app);
     Files& files = options->files;
     files.read(app.add_option("SCENARIO", options->scenarios, "scenario files with expectations (YAML)")
                    ->required());

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <thread>
@@ -170,12 +171,16 @@ struct CandumpLogger::Data {
         : port(a_port),
           path(a_path),
           interface(std::move(an_interface)),
-          out(path, std::ios::binary | std::ios::trunc) {
+          out(path, std::ios::binary | std::ios::app) {
         if (!out) throw InputError(path, 0, 0, "cannot be written");
         writer = std::thread([this] { write(); });
     }
-    ~Data() { finish(); }
+    ~Data() { end(); }
     void finish() {
+        end();
+        if (!begun) empty_file();
+    }
+    void end() {
         if (!writer.joinable()) return;
         stop = true;
         writer.join();
@@ -186,6 +191,11 @@ struct CandumpLogger::Data {
     // What the disk refused once leaves a hole: nothing is written behind it.
     void check() {
         if (!out && failure == 0) failure = errno != 0 ? errno : EIO;
+    }
+    void empty_file() {
+        std::error_code nothing_to_empty;  // a pipe, a device
+        std::filesystem::resize_file(path, 0, nothing_to_empty);
+        begun = true;
     }
     SHIFTRIG_TRUSTED_BEGIN  // try_enqueue never allocates
         void
@@ -203,6 +213,7 @@ struct CandumpLogger::Data {
             last = stop;  // read before the queue is emptied: nothing noted before the stop is left behind
             while (queue.try_dequeue(item))
                 append_candump_line(text, item.frame, item.time_ns, interface, item.direction);
+            if (!begun && !text.empty()) empty_file();
             errno = 0;
             out << text;  // into a stream that has failed: nowhere
             out.flush();
@@ -215,6 +226,7 @@ struct CandumpLogger::Data {
     CanPort& port;
     std::string path, interface;
     std::ofstream out;
+    bool begun = false;           // the writer's, while there is one
     std::atomic<int> failure{0};  // errno of the first write that went wrong
     moodycamel::ReaderWriterQueue<Item> queue{1 << 16};
     std::atomic<std::uint64_t> lost{0};

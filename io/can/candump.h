@@ -37,7 +37,8 @@ void append_candump_line(std::string& out, const Frame& frame, std::int64_t time
 // rig's simulated time) and with direction tokens. The file is written by a thread of its own.
 class CandumpLogger final : public CanPort {
   public:
-    // `port` must outlive it. Throws InputError if the file cannot be written.
+    // `port` must outlive it. Throws InputError if the file cannot be written. What was in the file stays there until the first
+    // frame comes, or finish().
     CandumpLogger(CanPort& port, const std::string& path, std::string interface = "can0");
     ~CandumpLogger() override;
     bool send(std::int64_t now_ns, const Frame& frame) SHIFTRIG_REALTIME override;

@@ -6,6 +6,7 @@
 #include "io/can/link.h"
 #include "io/model_file.h"
 #include "io/recording/candump.h"
+#include "io/recording/output_file.h"
 
 namespace shiftrig::io {
 
@@ -54,7 +55,7 @@ std::int64_t export_candump(RecordingReader& reader, const std::string& path) {
         throw InputError(manifest.model_path, 0, 0, "has no stanza `can:`, which says what the frames mean");
     const can::Mapping mapping = can::parse_mapping(model.can, model.path);
 
-    std::FILE* file = path == "-" ? stdout : std::fopen(path.c_str(), "we");
+    std::FILE* file = open_output(path);
     if (!file) throw RecordingError(path + ": cannot be written: " + std::strerror(errno));
     LogPort by_rig(file, can::Direction::transmitted), by_controller(file, can::Direction::received);
     SignalTable table = table_of(manifest);

@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cstring>
 
+#include "io/recording/output_file.h"
+
 namespace shiftrig::io {
 
 namespace {
@@ -22,7 +24,7 @@ std::string column_name(const plant::Signal& signal) {
 }
 
 CsvWriter::CsvWriter(const std::string& path, const std::vector<plant::Signal>& columns)
-    : path_(path), file_(path == "-" ? stdout : std::fopen(path.c_str(), "we")) {
+    : path_(path), file_(open_output(path)) {
     if (!file_) throw RecordingError(path + ": cannot be written: " + std::strerror(errno));
     line_ = "time_s";
     for (const auto& column : columns) line_ += "," + column_name(column);

@@ -11,7 +11,8 @@ using nlohmann::json;
 
 namespace {
 
-constexpr int format_version = 2;
+constexpr int format_version = 3;  // since 3 a recording says what its run came to
+constexpr int oldest_version = 2;  // that is read
 
 // Units go by their symbol, so that a reader in another language needs no table of ours.
 plant::Unit unit_of(const std::string& symbol) {
@@ -93,9 +94,10 @@ Manifest Manifest::from_json(const std::string& text) {
         const json document = json::parse(text);
         int version = 0;
         whole(document, "shiftrig_recording", version);
-        if (version != format_version)
+        if (version < oldest_version || version > format_version)
             throw RecordingError("is a recording of format " + std::to_string(version) +
-                                 ", this program reads format " + std::to_string(format_version));
+                                 ", this program reads formats " + std::to_string(oldest_version) + " and " +
+                                 std::to_string(format_version));
         Manifest m;
         m.model_path = document.at("model").at("path").get<std::string>();
         m.scenario_path = document.at("scenario").at("path").get<std::string>();

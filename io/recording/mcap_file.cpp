@@ -9,6 +9,7 @@
 
 #include "io/recording/checksum.h"
 #include "io/recording/manifest.h"
+#include "io/recording/output_file.h"
 
 namespace shiftrig::io {
 
@@ -67,7 +68,7 @@ std::uint32_t crc_of(std::string_view bytes, std::uint32_t start = 0) {
 }  // namespace
 
 McapFile::McapFile(const std::string& path, const std::string& library)
-    : path_(path), file_(path == "-" ? stdout : std::fopen(path.c_str(), "wbe")) {
+    : path_(path), file_(open_output(path)) {
     if (!file_) throw RecordingError(path + ": cannot be written: " + std::strerror(errno));
     put(magic);
     std::string content, bytes;

@@ -69,6 +69,7 @@ struct RecordingReader::Implementation {
     std::int64_t previous_tick = -1;
     std::int64_t ticks = 0, lost = 0;  // so far
     std::int64_t lost_at_end = 0;
+    std::string outcome;
     std::vector<double> known[3];  // the tables as of the tick being read, in whole blocks
     Ending ending = Ending::cut_short;
     std::string complaint;
@@ -93,6 +94,7 @@ struct RecordingReader::Implementation {
     bool next_event();
     template <class Record>
     bool decode_record(const char* type, Record& record);
+    bool take_outcome(const record_chunk_t& chunk);
     bool take_signals(RecordedTick& tick);
     bool take_closing(RecordedTick& tick, std::int32_t blocks);
     bool next(RecordedTick& tick);
@@ -118,6 +120,15 @@ const std::string& RecordingReader::complaint() const noexcept {
 }
 bool RecordingReader::next(RecordedTick& tick) {
     return !implementation_->ended && implementation_->next(tick);
+}
+
+const std::string& RecordingReader::outcome() const noexcept {
+    return implementation_->outcome;
+}
+std::string RecordingReader::unfinished() const {
+    const std::string& outcome = implementation_->outcome;
+    if (outcome.empty() || outcome == "completed") return "";
+    return path() + ": its run did not come to its end (outcome \"" + outcome + "\")";
 }
 
 std::int64_t RecordingReader::lost_at_end() const noexcept {
@@ -219,6 +230,14 @@ bool RecordingReader::Implementation::decode_record(const char* type, Record& re
     return true;
 }
 
+// A word, in one piece.
+bool RecordingReader::Implementation::take_outcome(const record_chunk_t& chunk) {
+    Collected word;
+    if (chunk.count != 1 || chunk.length < 1 || !word.add(chunk)) return damaged("its outcome");
+    outcome = printable(word.text());
+    return true;
+}
+
 bool RecordingReader::Implementation::take_signals(RecordedTick& tick) {
     record_signals_t signals, found;
     std::vector<std::byte> data(event.data.begin(), event.data.end());
@@ -267,6 +286,8 @@ bool RecordingReader::Implementation::next(RecordedTick& tick) {
         return same || damaged("records of two ticks are mixed");
     };
     while (next_event()) {
+        if (!outcome.empty() && event.channel != channel::record_end)
+            return damaged("it goes on behind its outcome");
         if (event.channel == channel::record_signals) {
             if (!take_signals(tick)) return false;
             ++blocks;
@@ -301,7 +322,13 @@ bool RecordingReader::Implementation::next(RecordedTick& tick) {
             tick.lost_before = gap.lost;
         } else if (event.channel == channel::record_chunk) {
             record_chunk_t chunk;
-            if (!decode_record("record_chunk_t", chunk) || !belongs(chunk)) return false;
+            if (!decode_record("record_chunk_t", chunk)) return false;
+            if (chunk.kind == static_cast<std::int32_t>(ChunkKind::outcome)) {
+                if (!first || blocks > 0) return damaged("a tick without its closing record");
+                if (!take_outcome(chunk)) return false;
+                continue;
+            }
+            if (!belongs(chunk)) return false;
             if (chunk.kind != static_cast<std::int32_t>(ChunkKind::state) || !state.add(chunk))
                 return damaged("a state out of order");
         } else if (event.channel == channel::record_tick) {

@@ -59,6 +59,12 @@ class RecordingReader {
     // One line naming the file for any ending but complete, otherwise empty.
     const std::string& complaint() const noexcept;
 
+    // At the end of a complete recording: what its run came to ("completed", "stopped", "too_far_behind", …); empty: it does
+    // not say, it is of an earlier version.
+    const std::string& outcome() const noexcept;
+    // One line naming the file if the run did not come to its end, otherwise empty.
+    std::string unfinished() const;
+
     // At the end of a complete recording: ticks lost behind the last one that was kept.
     std::int64_t lost_at_end() const noexcept;
 

@@ -31,7 +31,8 @@ enum class ChunkKind : std::int32_t {
     scenario = 3,
     state = 4,
     assembly = 5,
-    history = 6
+    history = 6,
+    outcome = 7,
 };
 
 inline constexpr std::size_t block_count(std::size_t signals) {

@@ -57,6 +57,8 @@ struct RecordingWriter::Implementation {
     std::vector<double> last[3];  // what the log holds so far
     std::int64_t kept = 0, last_tick = -1, last_sim_time_ns = 0;
 
+    std::string outcome;
+
     void run();
     void drain();
     void encode(const TickQueue::View& view);
@@ -134,6 +136,10 @@ std::int64_t RecordingWriter::lost() const noexcept {
     return implementation_->lost;
 }
 
+void RecordingWriter::came_to(const std::string& outcome) {
+    implementation_->outcome = outcome;
+}
+
 RecordingSummary RecordingWriter::end() {
     auto& self = *implementation_;
     if (self.thread.joinable()) {
@@ -143,6 +149,10 @@ RecordingSummary RecordingWriter::end() {
         }
         self.log_wakes.notify_one();
         self.thread.join();
+        if (!self.outcome.empty())
+            self.encoder->append_chunks(self.buffer, ChunkKind::outcome,
+                                        std::as_bytes(std::span(self.outcome)), self.last_tick,
+                                        self.last_sim_time_ns);
         record_end_t end{};
         end.ticks = self.kept;
         end.lost = self.lost;

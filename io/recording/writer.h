@@ -72,6 +72,9 @@ class RecordingWriter {
     // Blocks until a tick fits the queue. For paces without a wall clock.
     void wait_for_room();
     std::int64_t lost() const noexcept;
+    // What the run came to, in a word ("completed", "stopped"), to be told before the closing record. Not called: nothing
+    // is told.
+    void came_to(const std::string& outcome);
     RecordingSummary end();
 
   private:

@@ -157,21 +157,21 @@ class ResultFiles : public ::testing::Test {
 TEST_F(ResultFiles, AreReadAloneInListsAndInFolders) {
     const json shifts = two_runs()["road"];
     const std::string one = file("one.json", json{{"shifts", shifts}}.dump());
-    EXPECT_EQ(read_results(one, default_limits()), (json{{"one", shifts}}));
+    EXPECT_EQ(read_results(one, default_limits()).runs, (json{{"one", shifts}}));
     const std::string list =
         file("list.json", json{{"runs",
                                 {{{"scenario", "config/scenarios/a.yaml"}, {"shifts", shifts}},
                                  {{"name", "b"}, {"shifts", json::array()}}}}}
                               .dump());
-    EXPECT_EQ(read_results(list, default_limits()), (json{{"a", shifts}, {"b", json::array()}}));
-    EXPECT_EQ(read_results(folder.string(), default_limits()).size(), 3u);
+    EXPECT_EQ(read_results(list, default_limits()).runs, (json{{"a", shifts}, {"b", json::array()}}));
+    EXPECT_EQ(read_results(folder.string(), default_limits()).runs.size(), 3u);
 }
 
 TEST_F(ResultFiles, KeepDotsInTheirNamesAndRefuseANameThatIsTaken) {
     const std::string shifts = json{{"shifts", two_runs()["road"]}}.dump();
     file("shift.v1.json", shifts);
     file("shift.v2.json", shifts);
-    const json results = read_results(folder.string(), default_limits());
+    const json results = read_results(folder.string(), default_limits()).runs;
     EXPECT_TRUE(results.contains("shift.v1"));
     EXPECT_TRUE(results.contains("shift.v2"));
     file("z.json", R"({"scenario": "b/shift.v1.yaml", "shifts": []})");
@@ -209,6 +209,33 @@ TEST_F(ResultFiles, OfARunThatIsNotWholeAreRefusedInOneLine) {
     EXPECT_EQ(refused(R"("loop": {"ticks": 3})"), "accepted");
     EXPECT_EQ(refused(R"("error": "r.yaml: cannot be read")"),
               "r.json: run \"r\" could not be judged: r.yaml: cannot be read");
+}
+
+TEST_F(ResultFiles, OfWhichSomeAreNotWholeNameThemAndKeepTheRest) {
+    const json shifts = two_runs()["road"];
+    const auto set = [&](const char* name, const json& judged, const json& also) {
+        return read_results(
+            file(name, json{{"runs", {judged, {{"name", "b"}, {"shifts", shifts}}, also}}}.dump()),
+            default_limits());
+    };
+    const json fine{{"name", "a"}, {"shifts", shifts}}, none{{"name", "c"}, {"shifts", json::array()}};
+    const json broken{{"name", "a"}, {"shifts", json::array()}, {"error", "a.yaml:3:1: no such key"}};
+    const json stopped{{"name", "c"}, {"shifts", json::array()}, {"loop", {{"outcome", "stopped"}}}};
+    const ResultSet before = set("before.json", fine, none), after = set("after.json", broken, stopped);
+    EXPECT_TRUE(before.not_whole.empty());
+    const std::string place = (folder / "after.json").string() + ": run ";
+    EXPECT_EQ(after.not_whole, (std::map<std::string, std::string>{
+                                   {"a", place + "\"a\" could not be judged: a.yaml:3:1: no such key"},
+                                   {"c", place + "\"c\" did not come to its end (outcome \"stopped\"); only "
+                                                 "whole runs are compared"}}));
+    EXPECT_EQ(after.runs, (json{{"a", nullptr}, {"b", shifts}, {"c", nullptr}}));
+    EXPECT_TRUE(compare(before.runs, after.runs, default_limits()).empty());
+    EXPECT_TRUE(compare(after.runs, before.runs, default_limits()).empty());
+    json worse = after.runs;
+    worse["b"].erase(2);
+    const auto found = compare(before.runs, worse, default_limits());
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].text(), "b F1->F2 (2): no longer there");
 }
 
 TEST_F(ResultFiles, WrongOnesAreRefusedInOneLine) {

@@ -207,6 +207,61 @@ class Outputs(Commands):
         self.assertEqual(sorted(set(os.listdir(self.folder)) - {"p.png"}), ["p.png.svg", "u.lcmlog"], done.stderr)
 
 
+    def test_a_table_goes_straight_into_a_pipe(self):
+        """No file is made beside what has no place of its own: a pipe, a device, a stream of this program."""
+        os.mkdir(self.path("tmp"))
+        there = dict(os.environ, TMPDIR=self.path("tmp"))
+        arguments = [SHIFTRIG, "run", "--scenario", SHIFT, "--pace", "free", "--duration", "0.5", "--csv"]
+        subprocess.run(arguments + ["table.csv"], check=True, capture_output=True, cwd=self.folder)
+        with open(self.path("table.csv")) as file:
+            table = file.read()
+        os.mkdir(self.path("pipes"))
+        os.mkfifo(self.path("pipes/fifo"))
+        writer = subprocess.Popen(arguments + ["pipes/fifo"], stdout=subprocess.DEVNULL, cwd=self.folder, env=there)
+        seen = set()
+        while not os.listdir(self.path("tmp")):  # the recording of which the table is made
+            seen |= set(os.listdir(self.path("pipes")))
+            self.assertIsNone(writer.poll(), seen)
+        with open(self.path("pipes/fifo")) as file:
+            self.assertEqual(file.read(), table)
+        self.assertEqual(writer.wait(), 0)
+        self.assertEqual(seen | set(os.listdir(self.path("pipes"))), {"fifo"})
+        done = subprocess.run(arguments + ["/dev/stdout"], stdout=subprocess.PIPE, text=True, cwd=self.folder, env=there)
+        self.assertEqual((done.returncode, done.stdout[:len(table)] == table), (0, True))
+        with open(self.path("table.txt"), "w") as file:  # into which the run's summary goes, too: behind it
+            subprocess.run(arguments + ["/dev/stdout"], check=True, stdout=file, cwd=self.folder, env=there)
+        with open(self.path("table.txt")) as file:
+            text = file.read()
+        self.assertEqual((text[:len(table)] == table, text[len(table):].split(",")[0]), (True, "500 ticks"))
+        done = subprocess.run(arguments + ["/dev/null"], stdout=subprocess.DEVNULL, cwd=self.folder, env=there)
+        self.assertEqual((done.returncode, os.listdir(self.path("tmp"))), (0, []))
+        # A stream that was sent into a file is one: the table is made beside that, not in /dev.
+        with open(self.path("pipes/table"), "w") as file:
+            done = subprocess.run(arguments + ["/dev/fd/%d" % file.fileno()], stdout=subprocess.DEVNULL, cwd=self.folder, env=there,
+                                  pass_fds=[file.fileno()])
+        with open(self.path("pipes/table")) as file:
+            self.assertEqual((done.returncode, file.read() == table), (0, True))
+        os.remove(self.path("pipes/fifo"))
+        self.assert_refused("shiftrig: --csv: is made of the recording, which /dev/null does not keep",
+                            *arguments[1:], "x.csv", "--record", "/dev/null")
+
+    def test_what_is_in_a_name_does_not_break_the_line(self):
+        name, shown = "u\n\x1b[31m.lcmlog", r"u\n\x1b[31m.lcmlog"
+        self.recorded("--duration", "0.5", name=name)
+        os.mkdir(self.path("a\nb"))
+        self.assert_refused(f"--csv {shown}: is the file of RECORDING, which it would overwrite", "export", name, "--csv", name)
+        self.assert_refused(r"--csv q\nr: is the file of --record, too; each needs its own", "run", TRACTOR, "--record", "q\nr", "--csv", "q\nr")
+        self.assert_refused(r"a\nb: cannot be written: Is a directory", "run", TRACTOR, "--record", "a\nb")
+        self.assert_refused(r"shiftrig: scenario no\nne is given twice", "test", "no\nne", "no\nne")
+        cut = self.cut(name, 0.4, name="cut\n.lcmlog")
+        done = self.shiftrig("explain", cut)
+        self.assertRegex(done.stderr, r"^cut\\n\.lcmlog: is cut short.*\n$")
+        done = self.shiftrig("replay", name)
+        self.assertRegex(done.stdout, r"^u\\n\\x1b\[31m\.lcmlog: 500 ticks agree.*\n$")
+        done = self.shiftrig("run", TRACTOR, "a\nb")
+        self.assertEqual((done.returncode, done.stderr.splitlines()[0]), (2, r"The following argument was not expected: a\nb"))
+
+
 class NotWhole(Commands):
     def test_half_a_recording_is_compared_with_nothing(self):
         whole = self.recorded()
@@ -246,6 +301,56 @@ class NotWhole(Commands):
             self.assert_refused('stopped.json: run "stopped" did not come to its end (outcome "stopped"); only whole runs are compared',
                                 "compare", *arguments)
         self.assertEqual(self.shiftrig("compare", "whole.json", "whole.json").returncode, 0)
+        # Its recording is sound, and says the same.
+        whole, line = self.recorded(name="whole.lcmlog"), 'u.lcmlog: its run did not come to its end (outcome "stopped")'
+        for arguments in (("u.lcmlog", whole), (whole, "u.lcmlog"), ("u.lcmlog", "whole.json")):
+            self.assert_refused(line + "; only whole runs are compared", "compare", *arguments)
+        for command in (("explain",), ("replay",), ("replay", "--json"), ("report", "--json"), ("report", "-o", "r.html")):
+            done = self.shiftrig(command[0], "u.lcmlog", *command[1:])
+            self.assertEqual((done.returncode, done.stderr), (0, line + "\n"), command)
+            done = self.shiftrig(command[0], whole, *command[1:])
+            self.assertEqual((done.returncode, done.stderr), (0, ""), command)
+        for recording, outcome in (("u.lcmlog", "stopped"), (whole, "completed")):
+            self.assertEqual(json.loads(self.shiftrig("replay", recording, "--json").stdout)["outcome"], outcome)
+
+    def test_a_recording_of_a_run_that_gave_up_is_compared_with_nothing(self):
+        done = self.shiftrig("run", "--scenario", SHIFT, "--factor", "10000", "--catch-up", "0", "--overrun", "abort",
+                             "--record", "u.lcmlog")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assert_refused('u.lcmlog: its run did not come to its end (outcome "too_far_behind"); only whole runs are compared',
+                            "compare", "u.lcmlog", self.recorded(name="whole.lcmlog"))
+
+    def test_runs_that_are_not_whole_are_named_and_the_rest_is_compared(self):
+        for name in ("one", "two", "wrong"):
+            with open(SHIFT) as file, open(self.path(name + ".yaml"), "w") as copy:
+                copy.write(file.read().replace("../tractor.yaml", TRACTOR) + ("colour: red\n" if name == "wrong" else ""))
+        tested = self.shiftrig("test", "one.yaml", "two.yaml", "wrong.yaml", "--json")
+        self.assertEqual(tested.returncode, 2)
+        with open(self.path("before.json"), "w") as file:
+            file.write(tested.stdout)
+        result = json.loads(tested.stdout)
+        result["runs"][0]["loop"]["outcome"] = "too_far_behind"
+        result["runs"][1]["shifts"][0]["duration_s"] *= 2
+        with open(self.path("after.json"), "w") as file:
+            json.dump(result, file)
+        done = self.shiftrig("compare", "before.json", "after.json")
+        unknown = r'run "wrong" could not be judged: wrong\.yaml:\d+:1: colour is not a known key.*\n'
+        self.assertEqual(done.returncode, 2)
+        self.assertRegex(done.stderr, "^before\\.json: " + unknown + 'after\\.json: run "one" did not come to its end '
+                         r'\(outcome "too_far_behind"\); only whole runs are compared\n' + "after\\.json: " + unknown + "$")
+        self.assertRegex(done.stdout, r"^two F2->F3: duration_s .*, worse\n1 shifts compared, 1 differences for the worse; "
+                         r"runs not compared: 2\n$")
+        listed = json.loads(self.shiftrig("compare", "before.json", "after.json", "--json").stdout)
+        self.assertEqual(([d["run"] for d in listed["differences"]], [n["run"] for n in listed["not_compared"]]),
+                         (["two"], ["one", "wrong"]))
+        # Of a folder, too.
+        os.mkdir(self.path("kept"))
+        whole = self.recorded(name="kept/whole.lcmlog")
+        self.cut(whole, 0.4, name="kept/cut.lcmlog")
+        self.cut(whole, 0.001, name="kept/stub.lcmlog")
+        done = self.shiftrig("compare", "kept", "kept")
+        self.assertEqual((done.returncode, done.stdout), (2, "1 shifts compared, 0 differences for the worse; runs not compared: 2\n"))
+        self.assertRegex(done.stderr, r"^(kept/cut\.lcmlog: is cut short after .*\nkept/stub\.lcmlog: is cut short within .*\n){2}$")
 
 
 if __name__ == "__main__":

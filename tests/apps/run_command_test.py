@@ -416,6 +416,28 @@ class Results(InAFolder):
         self.assertGreater(len(of_machine["run"]), 3)
         self.assertEqual(of_machine["run"], of_machine["explain"])
 
+    def test_the_benchs_own_events_are_told_of_the_same_time_whoever_tells_them(self):
+        recording, snapshot, table = self.path("run.lcmlog"), self.path("x.snap"), self.path("x.csv")
+        own = lambda events: [e for e in events if e["kind"] in ("safe_command", "commands_return", "message_status")]
+        found = set()
+        for scenario in ("silent_controller", "corrupt_frames", "bus_load_full"):
+            path = f"{CONFIG}/scenarios/{scenario}.yaml"
+            told = own(free("--record", recording, "--csv", table, "--snapshot-at", "2.5", snapshot, scenario=path)["events"])
+            self.assertEqual(own(json.loads(command("explain", recording, "--json").stdout)), told, scenario)
+            found |= {(e["kind"], "bus fault" in e["text"]) for e in told}
+            # The safe command is held over a whole tick: what acts from t on stands in the row of t + 1 ms.
+            with open(table) as file:
+                acts = {round(1000 * float(row["time_s"])) - 1: float(row["rig.safe_command"]) for row in csv.DictReader(file)}
+            for event in told:
+                if event["kind"] != "message_status":
+                    began = round(1000 * event["time_s"])
+                    self.assertEqual((acts[began], acts[began - 1]), (1, 0) if event["kind"] == "safe_command" else (0, 1), event)
+            done = run("--from", snapshot, "--pace", "free", "--json", "--record", recording)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(own(json.loads(command("explain", recording, "--json").stdout)),
+                             own(json.loads(done.stdout)["events"]), scenario)
+        self.assertEqual(found, {("safe_command", False), ("commands_return", False), ("message_status", False), ("message_status", True)})
+
     def test_what_the_solver_says_of_itself_is_no_difference_of_machines(self):
         recording = self.path("shift.lcmlog")
         free("--record", recording)
@@ -484,15 +506,16 @@ class Results(InAFolder):
         return result, took
 
     def test_sigterm_ends_a_run_in_any_pace_whatever_it_waits_for(self):
-        recording = self.path("cut.lcmlog")
+        recording, started = self.path("cut.lcmlog"), self.path("started")
         recorded = lambda: os.path.exists(recording) and os.path.getsize(recording) > 0
         for arguments, ticks in (
                 (("--pace", "wall", "--rate-hz", "1", "--factor", "0.001"), 1),  # sleeps 1000 s
                 (("--pace", "lockstep", "--bus", "udpcan:239.74.163.2:43113", "--answer-timeout", "3600"), 10),  # a command cycle
                 (("--pace", "free", "--duration", "1e9"), None),
-                (("--pace", "wall", "--controller", "sleep 1000", "--bus", "inprocess", "--controller-start", "3600"), 0)):
+                (("--pace", "wall", "--controller", "touch " + started + "; sleep 1000", "--bus", "inprocess", "--controller-start", "3600"), 0)):
             with self.subTest(arguments):
-                result, took = self.stopped(*arguments, "--record", recording, after=recorded)
+                begun = recorded if ticks != 0 else lambda: os.path.exists(started)
+                result, took = self.stopped(*arguments, "--record", recording, after=begun)
                 self.assertLess(took, 5 if ticks is None else 2)  # the ticks of a free run are judged, too
                 if ticks is not None:
                     self.assertLessEqual(result["ticks"], ticks)
@@ -524,12 +547,67 @@ class Results(InAFolder):
         began = time.monotonic()
         done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "nixprog --now", "--controller-start", "60", "--json")
         self.assertEqual((done.returncode, done.stdout), (2, ""))
-        self.assertEqual(done.stderr.splitlines()[-1], 'controller "nixprog --now" could not be started (status 127)')
+        self.assertEqual(done.stderr, 'controller "nixprog --now" could not be started: there is no program nixprog\n')
         self.assertLess(time.monotonic() - began, 30)
-        done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "nixprog", "--controller-start", "0", "--json", "--factor", "4")
+        # What the shell has to be asked is known once it has tried.
+        done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "'nixprog'", "--controller-start", "0", "--json", "--factor", "4")
         self.assertEqual(done.returncode, 1, done.stderr)
-        self.assertIn('controller "nixprog" could not be started (status 127)', done.stderr.splitlines())
+        self.assertIn('controller "\'nixprog\'" could not be started (status 127)', done.stderr.splitlines())
         self.assertEqual(json.loads(done.stdout)["ticks"], 6000)
+
+    def test_a_run_that_does_not_begin_for_its_controller_leaves_its_files_as_they_were(self):
+        with open(self.path("text"), "w") as file:
+            file.write("#!/bin/sh\n")
+        os.mkdir(self.path("folder"))
+        for controller, why in (("nixprog", "there is no program nixprog"), (self.path("text"), self.path("text") + ": Permission denied"),
+                                (self.path("none --x"), self.path("none") + ": No such file or directory"),
+                                (self.path("folder"), self.path("folder") + ": Is a directory"), ("'nixprog'", None)):
+            outputs = []
+            for name in ("record.lcmlog", "table.csv", "trace.json", "can.log", "x.snap"):
+                outputs.append(self.path(name))
+                with open(outputs[-1], "w") as file:
+                    file.write("mine")
+            done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", controller, "--controller-start", "60", "--record", outputs[0],
+                       "--csv", outputs[1], "--trace", outputs[2], "--can-log", outputs[3], "--snapshot-at", "1", outputs[4])
+            self.assertEqual((done.returncode, done.stdout), (2, ""))
+            if why:
+                self.assertEqual(done.stderr, f'controller "{controller}" could not be started: {why}\n')
+            else:
+                self.assertEqual(done.stderr.splitlines()[-1], f'controller "{controller}" could not be started (status 127)')
+            for name in outputs:
+                with open(name) as file:
+                    self.assertEqual(file.read(), "mine", (name, controller))
+            self.assertEqual(len(os.listdir(self.folder)), 7)
+
+    def test_a_test_whose_controller_is_none_or_ends_fails_at_once(self):
+        junit = self.path("junit.xml")
+        lockstep = [MULTICAST, SHIFTRIG, "test", SHIFT, "--pace", "lockstep", "--bus", "udpcan:239.74.163.2:43113",
+                    "--answer-timeout", "60", "--junit", junit, "--controller"]
+        tested = lambda *more: subprocess.run(lockstep + list(more), capture_output=True, text=True, timeout=240)
+        began = time.monotonic()
+        done = tested("nixprog")
+        self.assertEqual((done.returncode, done.stdout, done.stderr),
+                         (2, "", 'controller "nixprog" could not be started: there is no program nixprog\n'))
+        self.assertFalse(os.path.exists(junit))
+        done = tested("'nixprog'")
+        self.assertEqual(done.returncode, 2)
+        self.assertEqual(done.stdout.splitlines()[1:-1],
+                         [f'     {SHIFT}: controller "\'nixprog\'" could not be started (status 127)'])
+        for controller, start, ended in (("exit 3", "0", "ended with status 3"), ("exit 0", "0.2", "ended with status 0"),
+                                         ("sleep 0.4; kill -9 $$", "0", "was ended by signal 9")):
+            done = tested(controller, "--controller-start", start)
+            self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+            told = done.stdout.splitlines()[1:-1]
+            self.assertEqual(len(told), 1, done.stdout)
+            self.assertRegex(told[0], "^     " + re.escape(SHIFT) + r": after [\d.]+ s of 6 s its controller \"" + re.escape(controller)
+                             + '" ' + ended + "$")
+        kept = self.path("plough_upshift.lcmlog")
+        with open(kept, "w") as file:
+            file.write("mine")
+        done = tested("exit 3", "--record", self.folder)
+        with open(kept) as file:
+            self.assertEqual((done.returncode, file.read()), (1, "mine"))
+        self.assertLess(time.monotonic() - began, 30)  # of 60 s for each answer
 
     def test_controller_that_ends_is_told_and_the_safe_command_acts(self):
         done = run("--scenario", SHIFT, "--bus", "inprocess", "--controller", "exit 3", "--pace", "wall", "--factor", "4",

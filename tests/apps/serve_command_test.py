@@ -67,6 +67,30 @@ class Serve(Folder):
         self.assertEqual(status, 0, err)
         self.assertGreater(self.assert_sound(self.path("x.lcmlog")), 0)
 
+    def test_a_controller_that_ends_is_told_once_and_the_machine_goes_on(self):
+        rig = Served(TRACTOR, "--bus", "inprocess", "--controller", "exit 3")
+        line = 'controller "exit 3" ended with status 3\n'
+        self.assertEqual(rig.process.stderr.readline(), line)
+        with urllib.request.urlopen(rig.url + "/api/live", timeout=10) as stream:
+            time.sleep(0.5)
+            page = stream.read1(1 << 20).decode()
+        self.assertIn("ended with status 3", page)
+        status, out, err = rig.end()
+        self.assertEqual((status, "ended with" in err), (0, False), err)
+        self.assertGreater(int(re.search(r"(\d+) executed", out).group(1)), 300)
+
+    def test_a_controller_that_is_no_program_is_refused_or_fails(self):
+        with open(self.path("x.lcmlog"), "w") as file:
+            file.write("mine")
+        rig = Served(TRACTOR, "--bus", "inprocess", "--controller", "nixprog", "--record", self.path("x.lcmlog"))
+        self.assertEqual(rig.end(None), (2, "", 'controller "nixprog" could not be started: there is no program nixprog\n'))
+        with open(self.path("x.lcmlog")) as file:
+            self.assertEqual(file.read(), "mine")
+        rig = Served(TRACTOR, "--bus", "inprocess", "--controller", "'nixprog'")
+        self.assertIn("not found", rig.process.stderr.readline())  # the shell
+        self.assertEqual(rig.process.stderr.readline(), 'controller "\'nixprog\'" could not be started (status 127)\n')
+        self.assertEqual(rig.end()[0], 1)
+
     def test_a_refused_parameter_is_told_to_who_asked_and_leaves_the_recording_as_it_was(self):
         rig = Served(TRACTOR, "--record", self.path("x.lcmlog"))
         status, text = rig.post("parameter", name=CAPACITY, value=-1)

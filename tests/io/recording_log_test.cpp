@@ -121,6 +121,62 @@ TEST(Recording, SameRunGivesTheSameFile) {
     EXPECT_TRUE(read_file(a.path) == read_file(b.path));
 }
 
+// What a run came to; one of the version before does not say.
+TEST(Recording, SaysWhatItsRunCameTo) {
+    const auto told = [](const char* outcome) {
+        TemporaryFile file(".lcmlog");
+        {
+            RecordingWriter writer(file.path);
+            writer.begin(manifest());
+            Tick t;
+            fill(t, 0);
+            writer.tick(t.record);
+            if (outcome) writer.came_to(outcome);
+        }
+        RecordingReader reader(file.path);
+        EXPECT_EQ(read_all(reader).size(), 1u);
+        EXPECT_EQ(reader.complaint(), "");
+        const std::string line = reader.unfinished();
+        return std::pair(reader.outcome(), line.empty() ? line : line.substr(file.path.size()));
+    };
+    using Told = std::pair<std::string, std::string>;
+    EXPECT_EQ(told("completed"), Told("completed", ""));
+    EXPECT_EQ(told("stopped"), Told("stopped", ": its run did not come to its end (outcome \"stopped\")"));
+    EXPECT_EQ(told(nullptr), Told("", ""));
+
+    std::string older = manifest().to_json();
+    older.replace(older.find("\"shiftrig_recording\": 3"), 23, "\"shiftrig_recording\": 2");
+    EXPECT_EQ(Manifest::from_json(older).kernel, "portable");
+    older.replace(older.find("\"shiftrig_recording\": 2"), 23, "\"shiftrig_recording\": 1");
+    try {
+        Manifest::from_json(older);
+        ADD_FAILURE();
+    } catch (const RecordingError& error) {
+        EXPECT_STREQ(error.what(), "is a recording of format 1, this program reads formats 2 and 3");
+    }
+}
+
+TEST(WrongRecording, GoingOnBehindItsOutcome) {
+    TemporaryFile file(".lcmlog");
+    RecordEncoder encoder(manifest().start_utime);
+    std::vector<std::byte> log;
+    const auto append = [&](ChunkKind kind, const auto& content) {
+        encoder.append_chunks(log, kind, std::as_bytes(std::span(content)), -1, 0);
+    };
+    append(ChunkKind::manifest, manifest().to_json());
+    append(ChunkKind::model, manifest().model_text);
+    append(ChunkKind::scenario, manifest().scenario_text);
+    append(ChunkKind::state, manifest().initial_state);
+    const std::string word = "stopped";
+    append(ChunkKind::outcome, word);
+    append(ChunkKind::outcome, word);
+    write_file(file.path, {reinterpret_cast<const char*>(log.data()), log.size()});
+    const std::string said = complaint_about(file.path);
+    EXPECT_NE(said.find(": is damaged before the first tick: it goes on behind its outcome"),
+              std::string::npos)
+        << said;
+}
+
 TEST(Recording, LcmsOwnLibraryReadsIt) {
     TemporaryFile file(".lcmlog");
     write(file.path, 20);

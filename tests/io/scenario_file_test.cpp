@@ -208,23 +208,44 @@ TEST(ScenarioFile, AnEventIsExpectedInAWindowThatHasTimeInIt) {
     EXPECT_EQ(refusal(head + "expect:\n  must_not: [{kind: lock, from_s: 5.5, until_s: 20}]\n"), "");
 }
 
+// What check_events() says of this event, expected of a machine with a device of every kind that tells any.
+std::string event_refusal(const std::string& event) {
+    static const auto model =
+        plant::Model::build(read_model(SHIFTRIG_SOURCE_DIR "/config/tractor.yaml").description);
+    try {
+        check_events(parse_scenario(head + "expect:\n  must_not: [{" + event + "}]\n", "s.yaml"), model);
+        return "";
+    } catch (const InputError& error) {
+        return error.what();
+    }
+}
+
 TEST(ScenarioFile, ADeviceThatTellsNoEventsIsNamedWithItsNeighbour) {
-    const auto device_refusal = [](const std::string& event) -> std::string {
-        try {
-            check_devices(parse_scenario(head + "expect:\n  must_not: [{" + event + "}]\n", "s.yaml"),
-                          {"Fc", "F2", "pinion_2"});
-            return "";
-        } catch (const InputError& error) {
-            return error.what();
-        }
-    };
-    EXPECT_EQ(device_refusal("kind: lock, device: F2"), "");
-    EXPECT_EQ(device_refusal("kind: lock"), "");
+    EXPECT_EQ(event_refusal("kind: lock, device: F2"), "");
+    EXPECT_EQ(event_refusal("kind: lock"), "");
     EXPECT_EQ(
-        device_refusal("kind: lock, device: F22"),
+        event_refusal("kind: lock, device: F22"),
         "s.yaml:4:14: expect: lock of F22: no device of this model has events by that name; nearest: F2");
-    EXPECT_EQ(device_refusal("kind: safe_command, device: F2"),
+    EXPECT_EQ(event_refusal("kind: safe_command, device: F2"),
               "s.yaml:4:14: expect: safe_command is of no device: it is the bench's own");
+}
+
+TEST(ScenarioFile, AnEventThatItsDeviceNeverTellsIsRefusedWithThoseItDoes) {
+    const std::string place = "s.yaml:4:14: expect: ";
+    EXPECT_EQ(event_refusal("kind: lock, device: axle_drive"),
+              place +
+                  "lock of axle_drive never happens; its events are mesh_sticks, mesh_releases, drive_side, "
+                  "fall_back");
+    EXPECT_EQ(
+        event_refusal("kind: mesh_sticks, device: F2"),
+        place +
+            "mesh_sticks of F2 never happens; its events are lock, break_away, engage, release, tie_up, "
+            "fall_back, facing_warning, facing_failure");
+    EXPECT_EQ(event_refusal("kind: break_away, device: engine"),
+              place + "break_away of engine never happens; its events are engine_stalls, engine_starts");
+    EXPECT_EQ(event_refusal("kind: drive_side, device: axle_drive"), "");
+    EXPECT_EQ(event_refusal("kind: facing_failure, device: F2"), "");
+    EXPECT_EQ(event_refusal("kind: engine_stalls, device: engine"), "");
 }
 
 }  // namespace

@@ -127,6 +127,7 @@ inline RecordingSummary write(const std::string& path, int ticks, const Recordin
         writer.wait_for_room();
         writer.tick(t.record);
     }
+    writer.came_to("completed");
     return writer.end();
 }
 

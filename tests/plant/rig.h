@@ -29,7 +29,11 @@ struct Rig {
     void step() {
         plant::step(model, operators, state, inputs, outputs, scratch);
         for (int i = 0; i < std::min(outputs.event_count, Outputs::event_capacity); ++i) {
-            events.push_back(outputs.events[static_cast<std::size_t>(i)]);
+            const Event& event = outputs.events[static_cast<std::size_t>(i)];
+            events.push_back(event);
+            if (event.device < 0) continue;
+            EXPECT_TRUE(tells(model, static_cast<std::size_t>(event.device), event.kind))
+                << explain(model, event);
         }
         fall_backs += outputs.certificate.fall_backs;
         flags |= outputs.certificate.flags;
