@@ -218,13 +218,12 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         if (is_held(w, leader, end)) continue;
         const double drive = release_drive(w, mode, leader, end);
         if (drive <= 0) {
-            const double left = loss_left(w, leader, end);
-            if (left >= 0) continue;
+            const double left = loss_left(w, leader, end), rounding = 1e-9 * torque_scale(w, end);
+            if (left >= -rounding) continue;
             if (!begin_known) internal_torques(w, mode, begin);
             begin_known = true;
             const double before = loss_left(w, leader, begin);
-            // Beyond it already, and nobody took the rest.
-            if (before < -1e-9 * torque_scale(w, begin)) continue;
+            if (before < -rounding) continue;  // already, and nobody took the rest
             const double theta = std::max(before, 0.) / (std::max(before, 0.) - left);
             if (first.device < 0 || theta < first.theta) first = {m.pairs + leader, theta, Change::limit};
             continue;
