@@ -45,26 +45,47 @@ void advance_pedal(Work& w, int pair) noexcept {
     }
 }
 
-void advance_valve_and_piston(Work& w, int pair, double pump_share) noexcept {
+void take_course(Work& w, int pair, const HydraulicStep& step) noexcept {
     const auto i = static_cast<std::size_t>(pair);
-    const PairLaw& law = w.model.pair_laws[i];
-    const PairCommand& command = w.operators.commands[i];
-    const ActuationHydraulic& hydraulic = *law.hydraulic;
-    HydraulicState state = read_hydraulic(w.next + law.actuator);
-    double pressure = command.target;
-    if (hydraulic.solenoid) pressure = solenoid_pressure(*hydraulic.solenoid, state.play, pressure);
-    const HydraulicStep step = advance_hydraulics(
-        hydraulic, w.operators.hydraulics[i], law.friction.return_pressure, state,
-        std::span<double>(w.next + law.actuator + hydraulic_slots, static_cast<std::size_t>(law.delay_slots)),
-        pressure, pump_share, command.valve_held);
-    write_hydraulic(w.next + law.actuator, state);
-    if (command.fixed) return;
+    if (w.operators.commands[i].fixed) return;
     w.scratch.loads[i].hydraulic = step;
     if (step.rests()) {
         w.scratch.held[i] = held_load(w, pair, step.chamber(0));
     } else {
         let_move(w.scratch, pair);
     }
+}
+
+// The valve over the step. A piston that it may move joins those that are to share the pump.
+void begin_hydraulics(Work& w, int pair) noexcept {
+    const auto i = static_cast<std::size_t>(pair);
+    ScratchData& s = w.scratch;
+    const PairLaw& law = w.model.pair_laws[i];
+    const PairCommand& command = w.operators.commands[i];
+    const HydraulicOperator& op = w.operators.hydraulics[i];
+    const ActuationHydraulic& hydraulic = *law.hydraulic;
+    const double return_pressure = law.friction.return_pressure;
+    HydraulicState state = read_hydraulic(w.next + law.actuator);
+    double pressure = command.target;
+    if (hydraulic.solenoid) pressure = solenoid_pressure(*hydraulic.solenoid, state.play, pressure);
+    const std::span<double> line(w.next + law.actuator + hydraulic_slots,
+                                 static_cast<std::size_t>(law.delay_slots));
+    const StepValues valve = valve_over_step(hydraulic, op, state, line, pressure, command.valve_held);
+    if (needs_course(hydraulic, return_pressure, state.piston, valve)) {
+        const auto n = static_cast<std::size_t>(s.piston_count++);
+        s.piston_pairs[n] = pair;
+        s.pistons[n] = begin_piston(hydraulic, return_pressure, op.fill_flow, op.h, state.piston, valve);
+    } else {
+        take_course(w, pair, end_step(hydraulic, valve, state));
+    }
+    write_hydraulic(w.next + law.actuator, state);
+}
+
+void end_hydraulics(Work& w, int pair, const PistonCourse& piston) noexcept {
+    double* const at = w.next + w.model.pair_laws[static_cast<std::size_t>(pair)].actuator;
+    HydraulicState state = read_hydraulic(at);
+    take_course(w, pair, end_step(piston, state));
+    write_hydraulic(at, state);
 }
 
 bool is_quiet(const Work& w, int pair) noexcept {
@@ -132,19 +153,13 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
     std::fill(s.moves.begin(), s.moves.end(), static_cast<unsigned char>(0));
     s.moving_count = 0;
 
-    int busy = 0;
-    double demand = 0;  // on the pump, by all pistons that fill [m³/s]
+    s.piston_count = 0;
     for (const int k : m.hydraulic_pairs) {
-        if (is_quiet(w, k)) continue;
-        const auto i = static_cast<std::size_t>(k);
-        const PairLaw& law = m.pair_laws[i];
-        s.busy[static_cast<std::size_t>(busy++)] = k;
-        demand += fill_demand(*law.hydraulic, w.operators.hydraulics[i], law.friction.return_pressure,
-                              read_hydraulic(w.next + law.actuator));
+        if (!is_quiet(w, k)) begin_hydraulics(w, k);
     }
-    const double pump = m.description.oil ? m.description.oil->pump_flow : 0;
-    const double share = pump > 0 && demand > pump ? pump / demand : 1;
-    for (int i = 0; i < busy; ++i) advance_valve_and_piston(w, s.busy[static_cast<std::size_t>(i)], share);
+    const auto count = static_cast<std::size_t>(s.piston_count);
+    advance_pistons({s.pistons.data(), count}, m.description.oil ? m.description.oil->pump_flow : 0);
+    for (std::size_t n = 0; n < count; ++n) end_hydraulics(w, s.piston_pairs[n], s.pistons[n]);
     for (const int k : m.pedal_pairs) advance_pedal(w, k);
     for (const int k : m.waveform_pairs) {
         if (!w.operators.commands[static_cast<std::size_t>(k)].fixed) let_move(s, k);
@@ -187,12 +202,7 @@ double pair_load(const Work& w, int pair, const Instant& at) SHIFTRIG_REALTIME {
     }
     if (law.source == LoadSource::hydraulic) {
         // The chamber jumps where the piston arrives: from the left it is still the spring's pressure.
-        const HydraulicStep& step = load.hydraulic;
-        const bool before = at.fraction < step.filled_from ||
-                            (at.side == Side::left && step.jumps() && at.fraction <= step.filled_from);
-        const double pressure = before
-                                    ? step.spring_begin + (step.spring_end - step.spring_begin) * at.fraction
-                                    : step.valve.at(at.fraction);
+        const double pressure = load.hydraulic.chamber(at.fraction, at.side == Side::left);
         return load_from_pressure(law.friction, pressure * w.operators.commands[i].scale);
     }
     return load_from_engagement(law.friction, load.values.at(at.fraction));

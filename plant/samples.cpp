@@ -59,7 +59,8 @@ ScratchData::ScratchData(const ModelData& m) {
         place_sample(m, *samples[i], buffer.data()->value + i * size);
     loads.resize(static_cast<std::size_t>(m.pairs));
     held.assign(static_cast<std::size_t>(m.pairs) + loop_slack, 0.);
-    for (auto* list : {&moving, &busy}) list->assign(static_cast<std::size_t>(m.pairs), 0);
+    for (auto* list : {&moving, &piston_pairs}) list->assign(static_cast<std::size_t>(m.pairs), 0);
+    pistons.resize(static_cast<std::size_t>(m.pairs));
     moves.assign(static_cast<std::size_t>(m.pairs), 0);
     engine_modes.resize(m.engines.size());
     const auto bytes = static_cast<std::size_t>(whole_words(m.contact_bytes));
@@ -111,8 +112,10 @@ void Scratch::fill_with_nan() noexcept {
     for (detail::PairLoad& load : s.loads) {
         load.values = {nan, nan, nan};
         load.hydraulic.valve = {nan, nan, nan};
-        load.hydraulic.filled_from = load.hydraulic.spring_begin = load.hydraulic.spring_end = nan;
+        load.hydraulic.full_until = load.hydraulic.filled_from = nan;
+        load.hydraulic.spring_begin = load.hydraulic.spring_end = nan;
     }
+    for (PistonCourse& c : s.pistons) c.piston = c.excess = c.rate = c.next = nan;
     s.dissipated = s.input_work = nan;
 }
 

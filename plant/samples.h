@@ -96,8 +96,9 @@ struct ScratchData {
     std::vector<double> held;          // per pair: its load where that does not change within the step [Nm]
     std::vector<unsigned char> moves;  // per pair: its load does, `loads` is its course
     std::vector<int> moving;           // the pairs whose load does
-    std::vector<int> busy;             // the pairs whose valve or piston does not rest with the command
-    int moving_count = 0;
+    std::vector<int> piston_pairs;     // the pairs whose piston may move, and how it does
+    std::vector<PistonCourse> pistons;
+    int moving_count = 0, piston_count = 0;
     std::vector<EngineMode> engine_modes;                                    // at the beginning of the step
     std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
     std::vector<unsigned char> overcome;  // per pair: broke away in the instant being settled

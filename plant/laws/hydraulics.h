@@ -4,8 +4,7 @@
 //     dead time   u_d(t) = u(t − d): commands are held over steps, so u_d changes at most once inside a step
 //     slew        ṙ = ± slew towards u_d
 //     valve       p̈ = ω² (r − p) − 2 ζ ω ṗ
-//     spring      p_s(x) = preload + (p_return − preload) x/stroke, preload ≤ p_return
-//     piston      x follows x_eq (where p_s(x_eq) = p, within 0…stroke) at no more than ± stroke · Q/V
+//     piston      x follows x_eq, where its spring p_s(x_eq) = p, as fast as its flow allows (piston.h)
 //     chamber     p_c = p where x = x_eq, p_s(x) while x moves
 //
 //   u     pressure command                          Pa, limited to 0…maximum_pressure
@@ -13,8 +12,6 @@
 //   p, ṗ  valve outlet pressure (states)            Pa, Pa/s
 //   x     piston stroke (state)                     m; capacity begins at full stroke, the kiss point
 //   p_c   chamber pressure                          Pa: what presses the plates above p_return
-//   Q     flow into the piston                      m³/s: fill_flow by oil viscosity and share of the pump
-//   V     fill volume                               m³
 //
 // r is linear between the few instants at which the target changes or is reached, and over such a piece the
 // valve is advanced exactly (particular solution r − 2ζṙ/ω, homogeneous part by its exponential): p is exact
@@ -22,7 +19,7 @@
 // full stroke with p > p_return; HydraulicStep says when, so that the engine can split its step there. All
 // else is continuous, p with two derivatives.
 // Source: usual electro-hydraulic clutch model; figures are estimates (config/tractor.yaml).
-// Does not model: flow forces, leakage, compressibility, a different emptying; p may swing below 0: harmless suction.
+// Does not model: flow forces, leakage, compressibility; p may swing below 0: harmless suction.
 #pragma once
 
 #include <algorithm>
@@ -32,6 +29,7 @@
 
 #include "plant/description.h"
 #include "plant/laws/oil.h"
+#include "plant/laws/piston.h"
 #include "plant/laws/step_values.h"
 #include "plant/math/elementary.h"
 #include "plant/math/table.h"
@@ -121,21 +119,6 @@ inline std::size_t delay_slots(const ActuationHydraulic& p, const Oil* oil, doub
     return static_cast<std::size_t>(p.dead_time * factor / h) + 3;
 }
 
-inline bool has_piston(const ActuationHydraulic& p) noexcept {
-    return p.stroke > 0 && p.fill_volume > 0 && p.fill_flow > 0;
-}
-
-inline double spring_pressure(const ActuationHydraulic& p, double return_pressure, double piston) noexcept {
-    return p.preload_pressure + (return_pressure - p.preload_pressure) * (piston / p.stroke);
-}
-
-// Stroke at which the spring balances the valve.
-inline double balanced_stroke(const ActuationHydraulic& p, double return_pressure, double valve) noexcept {
-    if (valve >= return_pressure) return p.stroke;
-    if (valve <= p.preload_pressure) return 0;
-    return p.stroke * (valve - p.preload_pressure) / (return_pressure - p.preload_pressure);
-}
-
 // Everything at rest at a pressure held for long.
 inline HydraulicState hydraulic_rest(const ActuationHydraulic& p, double return_pressure, double pressure,
                                      std::span<double> delay_line) noexcept {
@@ -149,17 +132,21 @@ inline HydraulicState hydraulic_rest(const ActuationHydraulic& p, double return_
 
 // ---- step ---------------------------------------------------------------------------------------
 
-// Chamber pressure over one step.
+// Chamber pressure over one step. A piston at full stroke passes on the valve's pressure; it is there until `full_until`
+// and again from `filled_from`: all the time where that is 0, no more or not yet in this step where it is above 1.
 struct HydraulicStep {
-    StepValues valve;  // p
-    double filled_from =
-        0;  // fraction of the step from which the piston is at full stroke; > 1: not in this step
-    double spring_begin = 0, spring_end = 0;  // p_s before that
+    StepValues valve;                         // p
+    double full_until = 0, filled_from = 0;   // fractions of the step
+    double spring_begin = 0, spring_end = 0;  // p_s else
 
-    // The right limit at filled_from itself.
-    double chamber(double s) const noexcept {
-        return s >= filled_from ? valve.at(s) : spring_begin + (spring_end - spring_begin) * s;
+    // The limit from inside a part of the step: from the left at its end.
+    double chamber(double s, bool from_left) const noexcept {
+        const bool full = s < full_until || s > filled_from || filled_from <= 0 ||
+                          (from_left ? s == full_until && s > 0 : s == filled_from);
+        return full ? valve.at(s) : spring_begin + (spring_end - spring_begin) * s;
     }
+    // The right limit at filled_from itself.
+    double chamber(double s) const noexcept { return chamber(s, false); }
     bool jumps() const noexcept { return filled_from > 0 && filled_from <= 1; }
     // The same pressure all the time.
     bool rests() const noexcept {
@@ -167,14 +154,6 @@ struct HydraulicStep {
                (filled_from <= 0 || (filled_from > 1 && spring_begin == spring_end));
     }
 };
-
-// Flow that this piston wants at the start of the step [m³/s]; the pump's share is min(1, pump_flow/Σ
-// demand).
-inline double fill_demand(const ActuationHydraulic& p, const HydraulicOperator& op, double return_pressure,
-                          const HydraulicState& state) noexcept {
-    return has_piston(p) && state.piston < balanced_stroke(p, return_pressure, state.valve) ? op.fill_flow
-                                                                                            : 0;
-}
 
 namespace detail {
 
@@ -218,39 +197,6 @@ inline bool valve_rests(const HydraulicState& state, double target) noexcept {
            std::fabs(state.valve_rate) <= no_rate;
 }
 
-inline void advance_piston(const ActuationHydraulic& p, const HydraulicOperator& op, double return_pressure,
-                           double pump_share, HydraulicState& state, HydraulicStep& step) noexcept {
-    if (!has_piston(p)) {
-        step.filled_from = 0;
-        state.chamber = state.valve;
-        return;
-    }
-    const double x0 = state.piston;
-    const double spring0 = spring_pressure(p, return_pressure, x0);
-    const double goal = balanced_stroke(p, return_pressure, step.valve.end);
-    const double speed = p.stroke * op.fill_flow * pump_share / p.fill_volume;
-    // A piston that rests on its stop starts when the valve passes the spring line inside the step.
-    double from = 0;
-    if (goal > x0 && step.valve.begin < spring0)
-        from = (spring0 - step.valve.begin) / (step.valve.end - step.valve.begin);
-    const double reach = speed * op.h * (1 - from);
-    double x1 = goal;
-    if (goal > x0 + reach) x1 = x0 + reach;
-    if (goal < x0 - reach) x1 = x0 - reach;
-    step.filled_from = 2;
-    if (x0 >= p.stroke) {
-        step.filled_from = 0;
-    } else if (x1 >= p.stroke) {
-        const double at = from + (p.stroke - x0) / (speed * op.h);
-        step.filled_from = at < 1 ? at : 1;
-    }
-    state.piston = x1;
-    step.spring_begin =
-        x0 == balanced_stroke(p, return_pressure, step.valve.begin) ? step.valve.begin : spring0;
-    state.chamber = x1 == goal ? state.valve : spring_pressure(p, return_pressure, x1);
-    step.spring_end = step.filled_from <= 1 ? return_pressure : state.chamber;
-}
-
 }  // namespace detail
 
 inline double limited_command(const ActuationHydraulic& p, double command) noexcept {
@@ -267,12 +213,11 @@ inline bool is_quiet(const ActuationHydraulic& p, double return_pressure, const 
            (!has_piston(p) || state.piston == balanced_stroke(p, return_pressure, target));
 }
 
-// One step with the pressure command `command` held over it. `valve_held`: the valve sticks and keeps its
-// outlet pressure.
-inline HydraulicStep advance_hydraulics(const ActuationHydraulic& p, const HydraulicOperator& op,
-                                        double return_pressure, HydraulicState& state,
-                                        std::span<double> delay_line, double command, double pump_share,
-                                        bool valve_held = false) noexcept {
+// The valve's outlet pressure over one step with the pressure command `command` held over it. `valve_held`: the valve
+// sticks and keeps its outlet pressure.
+inline StepValues valve_over_step(const ActuationHydraulic& p, const HydraulicOperator& op,
+                                  HydraulicState& state, std::span<double> delay_line, double command,
+                                  bool valve_held) noexcept {
     const std::size_t slots = delay_line.size();
     const auto head = static_cast<std::size_t>(state.head);
     delay_line[head] = limited_command(p, command);
@@ -289,36 +234,73 @@ inline HydraulicStep advance_hydraulics(const ActuationHydraulic& p, const Hydra
     const double late = delay_line[late_slot];
     const double early = change > 0 ? delay_line[late_slot > 0 ? late_slot - 1 : slots - 1] : late;
 
-    HydraulicStep step;
-    step.valve.begin = state.valve;
+    StepValues valve;
+    valve.begin = state.valve;
     if (early == late && detail::valve_rests(state, late)) {
         state.valve = late;
         state.valve_rate = 0;
-        step.valve.middle = step.valve.end = state.valve;
-        detail::advance_piston(p, op, return_pressure, pump_share, state, step);
-        return step;
+        valve.middle = valve.end = state.valve;
+        return valve;
     }
     if (valve_held) {
         state.slewed = state.valve;
         state.valve_rate = 0;
-        step.valve.middle = state.valve;
+        valve.middle = state.valve;
     } else if (early == late) {
         detail::drive_valve(p, op, state, 0.5 * op.h, late);
-        step.valve.middle = state.valve;
+        valve.middle = state.valve;
         detail::drive_valve(p, op, state, 0.5 * op.h, late);
     } else {
         const double half = 0.5 * op.h;
         const double first = change < half ? change : half;
         detail::drive_valve(p, op, state, first, early);
         detail::drive_valve(p, op, state, half - first, late);
-        step.valve.middle = state.valve;
+        valve.middle = state.valve;
         const double second = change > half ? change - half : 0;
         detail::drive_valve(p, op, state, second, early);
         detail::drive_valve(p, op, state, half - second, late);
     }
-    step.valve.end = state.valve;
-    detail::advance_piston(p, op, return_pressure, pump_share, state, step);
+    valve.end = state.valve;
+    return valve;
+}
+
+// There is a piston and this step may move it.
+inline bool needs_course(const ActuationHydraulic& p, double return_pressure, double piston,
+                         const StepValues& valve) noexcept {
+    return has_piston(p) && !stays_at_stop(p, return_pressure, piston, valve);
+}
+
+// Without a course: the valve's pressure.
+inline HydraulicStep end_step(const ActuationHydraulic& p, const StepValues& valve,
+                              HydraulicState& state) noexcept {
+    state.chamber = state.valve;
+    return {valve, 0, state.piston < p.stroke ? 2. : 0., valve.begin, valve.end};
+}
+
+inline HydraulicStep end_step(const PistonCourse& course, HydraulicState& state) noexcept {
+    const ActuationHydraulic& p = *course.description;
+    const double return_pressure = course.return_pressure;
+    const bool lags = course.motion == PistonMotion::fills || course.motion == PistonMotion::empties;
+    state.piston = course.piston;
+    state.chamber = lags ? spring_pressure(p, return_pressure, course.piston) : state.valve;
+    HydraulicStep step{course.valve, course.full_until, course.filled_from};
+    const double balance = balanced_stroke(p, return_pressure, course.valve.begin);
+    step.spring_begin = course.begin == balance ? std::min(course.valve.begin, return_pressure)
+                                                : spring_pressure(p, return_pressure, course.begin);
+    step.spring_end = step.filled_from <= 1 ? return_pressure : state.chamber;
     return step;
+}
+
+// One step of an actuator that has the pump for itself (pump_flow 0: as much as it asks for).
+inline HydraulicStep advance_hydraulics(const ActuationHydraulic& p, const HydraulicOperator& op,
+                                        double return_pressure, HydraulicState& state,
+                                        std::span<double> delay_line, double command, double pump_flow = 0,
+                                        bool valve_held = false) noexcept {
+    const StepValues valve = valve_over_step(p, op, state, delay_line, command, valve_held);
+    if (!needs_course(p, return_pressure, state.piston, valve)) return end_step(p, valve, state);
+    PistonCourse course = begin_piston(p, return_pressure, op.fill_flow, op.h, state.piston, valve);
+    advance_pistons({&course, 1}, pump_flow);
+    return end_step(course, state);
 }
 
 }  // namespace shiftrig::plant
