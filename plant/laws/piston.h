@@ -245,10 +245,12 @@ inline PistonCourse begin_piston(const ActuationHydraulic& p, double return_pres
     c.begin = c.piston = piston;
     const double balance = balanced_stroke(p, return_pressure, valve.begin);
     const double excess = valve.begin - spring_pressure(p, return_pressure, piston);
-    if (piston < balance) {
+    // A spring that does not stiffen balances the valve everywhere or nowhere: then its next pressure decides.
+    const bool falls = c.slope < 0 || (c.slope == 0 && c.bend < 0);
+    if (piston < balance && (excess > 0 || !falls)) {
         c.motion = PistonMotion::fills;
         c.excess = std::max(excess, 0.);
-    } else if (piston > balance) {
+    } else if (piston != balance) {
         c.motion = PistonMotion::empties;
         c.excess = std::min(excess, 0.);
     } else if (valve.begin > return_pressure) {

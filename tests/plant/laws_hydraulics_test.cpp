@@ -442,6 +442,21 @@ TEST(Piston, TurnsWithTheValveWithinAStep) {
     EXPECT_NEAR(course.piston, 1e-3 + (-0.3 + 0.4 - 0.3) * rate, 1e-15);
 }
 
+// A spring that does not stiffen, and a valve that is just falling through its pressure: the piston goes back, by 40 µm of 1 mm.
+TEST(Piston, OnASpringOfOnePressureFollowsTheValvesNextOne) {
+    ActuationHydraulic p;
+    p.stroke = 2e-3;
+    p.fill_volume = 2e-5;
+    p.fill_flow = 4e-4;
+    p.preload_pressure = 1.2e5;
+    for (const double fall : {1., -1.}) {
+        const StepValues valve{1.2e5, 1.2e5 - fall * 2e4, 1.2e5 - fall * 4e4};
+        PistonCourse course = begin_piston(p, 1.2e5, p.fill_flow, 1e-3, 1e-3, valve);
+        advance_pistons({&course, 1}, 0);
+        EXPECT_NEAR(course.piston, 1e-3 - fall * 4e-5, 1e-12) << fall;
+    }
+}
+
 TEST(Piston, ThatLeavesFullStrokeWithinAStepPressesAgainWhenItIsBack) {
     ActuationHydraulic p = reference_valve(true);
     p.preload_pressure = p_return;
