@@ -64,15 +64,6 @@ bool turns_at_rest(const Work& w, const Sample& s) {
     return false;
 }
 
-// Would it find one at rest beyond what its loss can be?
-bool goes_beyond_loss(const Work& w, const Mode& mode, const Sample& s) {
-    for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= w.model.pairs + w.model.meshes; --r) {
-        const double left = loss_left(w, mode.rows[r] - w.model.pairs - w.model.meshes, s);
-        if (left < 0 && left < -1e-9 * torque_scale(w, s)) return true;
-    }
-    return false;
-}
-
 // Would settling let a pair go that nothing presses any more, or engage one?
 bool engages_or_releases(const Work& w, const Sample& s) {
     const ModelData& m = w.model;
@@ -305,7 +296,7 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     OperatorsData& o = w.operators;
     o.first = static_cast<int>(s.first - o.samples);
     o.carried = s.carries && !engages_or_releases(w, s.begin()) &&
-                !(mode.rests && (turns_at_rest(w, s.begin()) || goes_beyond_loss(w, mode, s.begin())));
+                !(mode.rests && (turns_at_rest(w, s.begin()) || loses_too_much(w, mode, s.begin())));
     o.carried_energy = s.stored;
     copy_few(block + layout.engines, 3 * static_cast<int>(m.engines.size()), o.carried_engines.data());
 }

@@ -247,7 +247,8 @@ void build_outputs(ModelBuilder& builder) {
     add("certificate.mode_lookups", Unit::one, "modes asked for");
     add("certificate.mode_misses", Unit::one, "modes built");
     add("certificate.flags", Unit::one,
-        "bit 0 tie-up, bit 1 direction search gave up, bit 2 not finite, bit 3 coarse, bit 4 instant not "
+        "bit 0 tie-up, bit 1 no directions of power agreed, bit 2 not finite, bit 3 coarse, bit 4 instant "
+        "not "
         "found");
 }
 

@@ -102,7 +102,7 @@ struct Certificate {
     std::int32_t fall_backs = 0;      // next-step rule used
     std::int32_t mode_lookups = 0;
     std::int32_t mode_misses = 0;  // operators built in this step
-    // Bit 0: tie-up (split not unique); 1: direction search gave up; 2: not finite; 3: even the shortest parts that
+    // Bit 0: tie-up (split not unique); 1: no states or directions agreed; 2: not finite; 3: even the shortest parts that
     // Description::maximum_parts allows are coarse (docs/mechanics.md, One step); nobody looks where it is 1 or states change
     // from the next step on; 4: an instant was not found, and a state changed where the search for it ended.
     std::int32_t flags = 0;

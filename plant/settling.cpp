@@ -124,6 +124,7 @@ bool lean_on_losses(Work& w, const Mode& mode, const Use& most, Sample& s) SHIFT
             // Not so without a tree: there a loop at rest may be held by torques at the very kink of a mesh's losses, where
             // neither direction agrees and both give nearly the same.
             if ((mode.tree && !agrees) || !leaning.bound[k] || relieved >= use * (1 - 1e-6)) continue;
+            if (loses_too_much(w, leaning, s, piece)) continue;  // passed to nobody
             use = relieved;
             found = true;
             std::copy(trial, trial + m.contact_bytes, w.scratch.release.data());
@@ -159,6 +160,8 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
                 give_way(w, mode, worst, worst.pair, s);
                 continue;
             }
+        } else {
+            w.outputs.certificate.flags |= 2;
         }
         if (w.scratch.told_events < w.outputs.event_count) tell_closings(w, mode, s);
         std::fill(w.scratch.overcome.begin(), w.scratch.overcome.end(), static_cast<unsigned char>(0));

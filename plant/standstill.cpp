@@ -34,12 +34,8 @@ bool is_consistent(Work& w, const Piece& piece, unsigned char* contact, bool goe
     const ModelData& m = w.model;
     contact_forces(w, contact, s);
     const Mode& mode = find_directions(w, contact, s);
-    const double size = torque_scale(w, s);
-    if (is_overloaded(w, most_used(w, contact, s, piece).pair, s)) return false;
-    for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
-        const int mesh = mode.rows[r] - m.pairs - m.meshes;
-        if (piece.holds(m.pairs + mesh) && loss_left(w, mesh, s) < -1e-9 * size) return false;
-    }
+    if (is_overloaded(w, most_used(w, contact, s, piece).pair, s) || loses_too_much(w, mode, s, piece))
+        return false;
     sample_rate(w, mode, s);
     for (int k = 0; k < m.first_flank; ++k) {
         const unsigned char state = contact[k];
@@ -221,7 +217,7 @@ struct Search {
 
 }  // namespace
 
-Rearrangement rearrange(Work& w, int gives_way, int around, Sample& s) SHIFTRIG_REALTIME {
+Rearrangement rearrange(Work& w, int gives_way, int around, Sample& s, bool among_losses) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     Search search{.w = w,
                   .mode = find_mode(m, w.operators, w.contact, w.scratch),
@@ -236,7 +232,7 @@ Rearrangement rearrange(Work& w, int gives_way, int around, Sample& s) SHIFTRIG_
     // Meshes of one motion that share their losses in another way are no change, unless they relieve a pair; when they go,
     // release_drive() says.
     const unsigned char* const trial = w.scratch.trial.data();
-    const int relevant = search.goes || gives_way >= 0 ? m.contact_bytes : m.pairs;
+    const int relevant = search.goes || gives_way >= 0 || among_losses ? m.contact_bytes : m.pairs;
     if (!found || std::equal(trial, trial + relevant, w.contact)) {
         search.forget();
         return Rearrangement::none;

@@ -12,12 +12,13 @@ namespace shiftrig::plant::detail {
 //
 // Solves it for everything at rest at the sample, and puts the contact states that follow into place. `gives_way`, a locked pair or
 // −1, is at its limit whatever the last digits of its torque say. On a long chain, of everything at rest that is joined to
-// device `around`.
+// device `around`. `among_losses`: that meshes of one motion share their losses in another way is a change as well.
 enum class Rearrangement {
     none,    // no solution other than the states there are
     stands,  // others carry the load, nothing moves
     moves,
 };
-Rearrangement rearrange(Work& work, int gives_way, int around, Sample& sample) SHIFTRIG_REALTIME;
+Rearrangement rearrange(Work& work, int gives_way, int around, Sample& sample,
+                        bool among_losses = false) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

@@ -222,6 +222,17 @@ double loss_left(const Work& w, int mesh, const Sample& s) SHIFTRIG_REALTIME {
     return loss.allowed - std::fabs(loss.needed);
 }
 
+bool loses_too_much(const Work& w, const Mode& mode, const Sample& s, const Piece& piece) SHIFTRIG_REALTIME {
+    const ModelData& m = w.model;
+    for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
+        const int mesh = mode.rows[r] - m.pairs - m.meshes;
+        if (!piece.holds(m.pairs + mesh)) continue;
+        const double left = loss_left(w, mesh, s);
+        if (left < 0 && left < -1e-9 * torque_scale(w, s)) return true;
+    }
+    return false;
+}
+
 bool is_held(const Work& w, int leader, const Sample& s) SHIFTRIG_REALTIME {
     const LossAtRest loss = loss_at_rest(w, leader, s);
     return std::fabs(loss.needed) < (1 - 1e-6) * loss.allowed;
@@ -230,33 +241,12 @@ bool is_held(const Work& w, int leader, const Sample& s) SHIFTRIG_REALTIME {
 namespace {
 
 // The losses of a motion at rest are told of its leader alone, and may be more than that one can lose as long as the others can
-// lose the rest. To a locked pair between them it matters which: the leader goes to its limit then, and the next of the motion
-// leads. One that is at its limit the other way has to come back from it first.
-bool share_losses(Work& w, const Mode& mode, int leader, double direction, unsigned char at_limit,
-                  const Piece& piece, Sample& s) {
-    const ModelData& m = w.model;
-    const auto between = [&](int k) { return w.contact[k] == locked && piece.holds(k); };
-    int pair = 0;
-    while (pair < m.pairs && !between(pair)) ++pair;
-    if (pair == m.pairs) return false;
-    const signed char* const part = w.scratch.family.data();
-    if (find_family(w, mode, leader, w.scratch.family.data()) == 0) return false;
-    for (const int k : m.lossy_meshes) {
-        unsigned char& state = w.contact[m.pairs + k];
-        if (state == stuck || motion_sign(state) * part[m.pairs + k] * direction >= 0) continue;
-        state = stuck;
-        contact_forces(w, w.contact, s);
-        return true;
+// lose the rest. To a locked pair between them it matters which do.
+bool matters_to_pairs(const Work& w, const Piece& piece) {
+    for (int k = 0; k < w.model.pairs; ++k) {
+        if (w.contact[k] == locked && piece.holds(k)) return true;
     }
-    unsigned char* const trial = w.scratch.trial.data();
-    std::copy(w.contact, w.contact + m.contact_bytes, trial);
-    trial[m.pairs + leader] = at_limit;
-    contact_forces(w, trial, s);
-    const bool held = find_directions(w, trial, s).bound[m.pairs + leader] != 0;
-    if (held) std::copy(trial, trial + m.contact_bytes, w.contact);
-    contact_forces(w, w.contact, s);
-    if (!held) internal_torques(w, mode, s);
-    return held;
+    return false;
 }
 
 }  // namespace
@@ -301,15 +291,16 @@ bool leave_to_others(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         if (taker >= 0) return true;
         internal_torques(w, mode, s);
         if (asked && rearrange(w, -1, device, s) != Rearrangement::none) return true;
-        if (share_losses(w, mode, mesh, direction, moving(direction, x), piece, s)) return true;
+        if (matters_to_pairs(w, piece) && rearrange(w, -1, device, s, true) != Rearrangement::none)
+            return true;
     }
     return false;
 }
 
 namespace {
 
-// Several motions of one piece may be at rest, and more meshes than there are motions: which of them go then hangs on all of
-// them together, and a mesh that would go by itself may have to stay.
+// Where several motions are at rest, and more meshes than there are motions, which of them go hangs on all of them together, and
+// a mesh that would go by itself may have to stay.
 bool holds_several(const Work& w, const Mode& mode) {
     const int first = w.model.pairs + w.model.meshes;
     return mode.row_count >= 2 && mode.rows[mode.row_count - 2] >= first;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "plant/forces.h"
+#include "plant/piece.h"
 
 namespace shiftrig::plant::detail {
 
@@ -14,6 +15,10 @@ void family_losses(Work& work, const Mode& mode, int leader, Sample& sample,
 int leader_of(Work& work, const Mode& mode, int mesh) SHIFTRIG_REALTIME;
 // What is left of the loss that a stuck mesh can take [Nm].
 double loss_left(const Work& work, int mesh, const Sample& sample) SHIFTRIG_REALTIME;
+
+// Would one of the piece have to lose more than it can?
+bool loses_too_much(const Work& work, const Mode& mode, const Sample& sample,
+                    const Piece& piece = {}) SHIFTRIG_REALTIME;
 
 // Does the leader's own loss suffice, beyond rounding, whatever its family could add? Then nothing goes, and there is no
 // need to try.

@@ -13,7 +13,8 @@ struct Flag {
 constexpr Flag flags[] = {
     // by bit
     {"tie_up", "more pairs are closed than the motion needs: how they share the torque is not unique"},
-    {"direction_search_gave_up", "no directions of power agreed with the losses"},
+    {"direction_search_gave_up",
+     "no contact states and directions of power were found that agree with one another"},
     {"not_finite", "the state is not finite: nothing from there on is worth anything"},
     {"coarse", "even the shortest parts of a step are coarse: try a shorter step or a higher maximum_parts"},
     {"instant_not_found",
