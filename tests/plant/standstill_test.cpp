@@ -219,6 +219,44 @@ TEST(Standstill, AClutchBetweenGearsAtRestCarriesWhatTheirLossesLeaveIt) {
     }
 }
 
+// Every such train rests where a torque of the clutch lies within the limits of both gears and its own, and passes on one
+// of those; elsewhere it moves.
+TEST(Standstill, TwoGearsAndAClutchRestWhereTheyCanAndNowhereElse) {
+    int rests = 0, moves = 0;
+    for (const Method method : {Method::etd3, Method::ark3}) {
+        for (const double first : {0.7, 0.85, 1.}) {
+            for (const double second : {0.75, 0.9, 1.}) {
+                for (int load = 62; load <= 150; load += 8) {
+                    for (int capacity = 55; capacity <= 135; capacity += 16) {
+                        const double least = std::max(first * 100, second * load);
+                        const double most = std::min({100 / first, load / second, 1. * capacity});
+                        Description d = clutch_between_gears(capacity, load);
+                        d.gears[0].efficiency = first;
+                        d.gears[1].efficiency = second;
+                        d.method = method;
+                        Rig rig(d);
+                        rig.run(0.003);
+                        bool still = true;
+                        for (const double speed : rig.state.speeds()) still = still && speed == 0;
+                        const std::string where = std::string(rig.model.engine()) + " " +
+                                                  std::to_string(first) + " " + std::to_string(second) +
+                                                  ", load " + std::to_string(load) + ", capacity " +
+                                                  std::to_string(capacity);
+                        ASSERT_EQ(still, least <= most) << where;
+                        ASSERT_EQ(rig.fall_backs, 0) << where;
+                        (still ? rests : moves) += 1;
+                        if (!still) continue;
+                        ASSERT_GE(rig.out("clutch.c.torque"), least - 1e-6) << where;
+                        ASSERT_LE(rig.out("clutch.c.torque"), most + 1e-6) << where;
+                    }
+                }
+            }
+        }
+    }
+    EXPECT_GT(rests, 200);
+    EXPECT_GT(moves, 200);
+}
+
 // A load that turns round: what was at its limit one way has to come back from it.
 TEST(Standstill, LossesAtRestFollowALoadThatTurnsRound) {
     for (const Method method : {Method::etd3, Method::ark3}) {
