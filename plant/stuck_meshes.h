@@ -35,7 +35,7 @@ bool release_stuck_meshes(Work& work, const Mode& mode, Sample& sample) SHIFTRIG
 
 // A stuck mesh that nothing sets in motion, but whose loss would have to be more than it can be, stays at its limit, and a
 // pair at rest that had been at its own takes the rest: it locks. The counterpart of lean_on_losses(). Where there is none, but a
-// locked pair to whose torque it matters, the next mesh of the same motion does.
+// locked pair to whose torque it matters, everything at rest is asked together.
 bool leave_to_others(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

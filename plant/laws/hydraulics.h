@@ -147,7 +147,6 @@ struct HydraulicStep {
     }
     // The right limit at filled_from itself.
     double chamber(double s) const noexcept { return chamber(s, false); }
-    bool jumps() const noexcept { return filled_from > 0 && filled_from <= 1; }
     // The same pressure all the time.
     bool rests() const noexcept {
         return valve.begin == valve.end && valve.begin == valve.middle &&
@@ -289,18 +288,6 @@ inline HydraulicStep end_step(const PistonCourse& course, HydraulicState& state)
                                                 : spring_pressure(p, return_pressure, course.begin);
     step.spring_end = step.filled_from <= 1 ? return_pressure : state.chamber;
     return step;
-}
-
-// One step of an actuator that has the pump for itself (pump_flow 0: as much as it asks for).
-inline HydraulicStep advance_hydraulics(const ActuationHydraulic& p, const HydraulicOperator& op,
-                                        double return_pressure, HydraulicState& state,
-                                        std::span<double> delay_line, double command, double pump_flow = 0,
-                                        bool valve_held = false) noexcept {
-    const StepValues valve = valve_over_step(p, op, state, delay_line, command, valve_held);
-    if (!needs_course(p, return_pressure, state.piston, valve)) return end_step(p, valve, state);
-    PistonCourse course = begin_piston(p, return_pressure, op.fill_flow, op.h, state.piston, valve);
-    advance_pistons({&course, 1}, pump_flow);
-    return end_step(course, state);
 }
 
 }  // namespace shiftrig::plant
