@@ -47,3 +47,20 @@ void place(const Placing& p, const double* source, double factor, double* panels
         }
     }
 }
+
+void sweep(const Sweep& s, const double* from, const double* start, double* to) SHIFTRIG_REALTIME {
+    constexpr int registers = stripe_width / lanes;
+    for (int k = 0; k < s.count; ++k) {
+        const int row = s.order[k];
+        Lanes sum[registers] = {};
+        const int end = s.row_begin[row + 1];
+        for (int e = s.row_begin[row]; e < end; ++e) {
+            const double* const x = from + s.column[e] * stripe_width;
+            for (int i = 0; i < registers; ++i) sum[i] += s.value[e] * read(x + i * lanes);
+        }
+        const double* const first = start + row * stripe_width;
+        double* const y = to + row * stripe_width;
+        for (int i = 0; i < registers; ++i)
+            write(y + i * lanes, s.share * read(first + i * lanes) + s.factor * sum[i]);
+    }
+}

@@ -23,7 +23,8 @@ void advance(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     } else {
         // Parts of one length share their operators.
         if (s.part_mode != &mode || s.part_modes_built != w.operators.misses || s.part.length != h) {
-            s.part = build_step_operators(m, mode, h, s.operator_memory.data()->value, s.workspace);
+            s.part = build_step_operators(m, mode, h, s.operator_memory.data()->value, s.workspace,
+                                          s.workspace_index.data());
             s.part_mode = &mode;
             s.part_modes_built = w.operators.misses;
         }

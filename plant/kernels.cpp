@@ -58,7 +58,8 @@ inline double joined(const Lanes& v, const Join& join) noexcept {
 }  // namespace
 
 Kernel portable_kernel() {
-    Kernel kernel{KernelKind::portable, "portable", {}, {}, device_loops, {combine, place}};
+    Kernel kernel{KernelKind::portable,   "portable", {}, {}, multiply_each_portable, device_loops,
+                  {combine, place, sweep}};
     for (Multiply& product : kernel.products) product = multiply_portable;
     for (MultiplyEach& products : kernel.multiples) products = multiply_each_portable;
     return kernel;

@@ -65,6 +65,16 @@ struct Placing {
     const double* column_scale = nullptr;  // per column; null: 1
 };
 
+// to_i = share·start_i + factor·Σ_j z_ij from_j for the rows `order[0 … count)` of stripes, z by rows (sparse_exponential.h).
+constexpr int stripe_width = 16;
+struct Sweep {
+    const int *row_begin = nullptr, *column = nullptr;
+    const double* value = nullptr;
+    const int* order = nullptr;
+    int count = 0;
+    double factor = 0, share = 0;
+};
+
 // For building operators.
 struct AlgebraLoops {
     // The first `count` numbers of Σ factor · of.
@@ -72,6 +82,8 @@ struct AlgebraLoops {
     // Of a source with block_rows rows, column after column.
     void (*place)(const Placing& placing, const double* source, double factor,
                   double* panels) SHIFTRIG_REALTIME = nullptr;
+    void (*sweep)(const Sweep& sweep, const double* from, const double* start,
+                  double* to) SHIFTRIG_REALTIME = nullptr;
 };
 
 // One implementation for each of the heights 4, 8, … 24, so that none has to ask, and one for all taller products.
@@ -81,6 +93,7 @@ struct Kernel {
     const char* name = "";
     Multiply products[short_products + 1] = {};  // [rows / 4 − 1], the taller ones last
     MultiplyEach multiples[short_products + 1] = {};
+    MultiplyEach many = nullptr;  // for large matrices; may sum in another order
     DeviceLoops loops;
     AlgebraLoops algebra;
 

@@ -28,6 +28,10 @@ struct Eight {
         sum.upper = _mm256_fmadd_pd(_mm256_loadu_pd(p), x, sum.upper);
         sum.lower = _mm256_fmadd_pd(_mm256_loadu_pd(p + 4), x, sum.lower);
     }
+    static void put(const Sum& sum, double* y) noexcept {
+        _mm256_storeu_pd(y, sum.upper);
+        _mm256_storeu_pd(y + 4, sum.lower);
+    }
     void store(const double* y0, double* y) const noexcept {
         __m256d upper = total_of(s0.upper, s1.upper, s2.upper, s3.upper);
         __m256d lower = total_of(s0.lower, s1.lower, s2.lower, s3.lower);
@@ -55,6 +59,7 @@ struct Four {
 };
 
 constexpr int most_panels = 1;
+constexpr int block_panels = 1, block_columns = 6;
 
 constexpr int lanes = 4;
 

@@ -12,12 +12,14 @@ namespace shiftrig::plant::detail {
 namespace {
 
 struct Eight {
+    using Sum = __m512d;
     static constexpr int height = 8;
     __m512d s0 = _mm512_setzero_pd(), s1 = s0, s2 = s0, s3 = s0;
 
     static void add(__m512d& sum, const double* p, const double* v) noexcept {
         sum = _mm512_fmadd_pd(_mm512_loadu_pd(p), _mm512_set1_pd(*v), sum);
     }
+    static void put(const Sum& sum, double* y) noexcept { _mm512_storeu_pd(y, sum); }
     void store(const double* y0, double* y) const noexcept {
         __m512d total = _mm512_add_pd(_mm512_add_pd(s0, s1), _mm512_add_pd(s2, s3));
         if (y0) total = _mm512_add_pd(_mm512_loadu_pd(y0), total);
@@ -40,6 +42,7 @@ struct Four {
 };
 
 constexpr int most_panels = 3;
+constexpr int block_panels = 3, block_columns = 8;
 
 constexpr int lanes = 8;
 

@@ -79,11 +79,58 @@ void tall_products(const double* panel, int rows, int columns, const double* v, 
 }
 SHIFTRIG_TRUSTED_END
 
+// Products with many columns: of so many panels below one another and so many columns all sums lie in registers, and what
+// is loaded serves several.
+template <int panels, int columns>
+inline void multiply_block(const double* p, long panel, int depth, const double* v, long stride,
+                           double* y) noexcept {
+    typename Eight::Sum sum[panels][columns] = {};
+    for (int k = 0; k < depth; ++k, p += panel_rows, ++v) {
+#pragma GCC unroll 8
+        for (int c = 0; c < columns; ++c) {
+#pragma GCC unroll 8
+            for (int i = 0; i < panels; ++i) Eight::add(sum[i][c], p + i * panel, v + c * stride);
+        }
+    }
+#pragma GCC unroll 8
+    for (int c = 0; c < columns; ++c) {
+#pragma GCC unroll 8
+        for (int i = 0; i < panels; ++i) Eight::put(sum[i][c], y + c * stride + i * panel_rows);
+    }
+}
+
+// `panels` of them and all columns.
+template <int panels>
+inline void multiply_blocks(const double* p, int depth, const double* v, int count, long stride,
+                            double* y) noexcept {
+    const long panel = static_cast<long>(depth) * panel_rows;
+    int c = 0;
+    for (; c + block_columns <= count; c += block_columns)
+        multiply_block<panels, block_columns>(p, panel, depth, v + c * stride, stride, y + c * stride);
+    for (; c < count; ++c) multiply_block<panels, 1>(p, panel, depth, v + c * stride, stride, y + c * stride);
+}
+
+SHIFTRIG_TRUSTED_BEGIN
+void many_products(const double* panel, int rows, int columns, const double* v, int count,
+                   double* y) SHIFTRIG_REALTIME {
+    constexpr int most = block_panels * panel_rows;
+    int r = 0;
+    for (; r + most <= rows; r += most)
+        multiply_blocks<block_panels>(panel + r * columns, columns, v, count, rows, y + r);
+    for (; r + panel_rows <= rows; r += panel_rows)
+        multiply_blocks<1>(panel + r * columns, columns, v, count, rows, y + r);
+    if (r == rows) return;
+    for (int c = 0; c < count; ++c)
+        product<4>(panel + r * columns, 4, columns, v + c * rows, nullptr, y + c * rows + r);
+}
+SHIFTRIG_TRUSTED_END
+
 Kernel kernel_of(KernelKind kind, const char* name) {
     return {kind,
             name,
             {product<4>, product<8>, product<12>, product<16>, product<20>, product<24>, tall_product},
             {products<4>, products<8>, products<12>, products<16>, products<20>, products<24>, tall_products},
+            many_products,
             device_loops,
-            {combine, place}};
+            {combine, place, sweep}};
 }

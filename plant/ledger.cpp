@@ -99,7 +99,8 @@ void book_finely(Work& w, const Mode& mode) {
     int parts = mode.ledger_parts;
     if (s.used.length != mode.step.length) {
         parts = ledger_parts(mode, h / w.h);
-        op = build_step_operators(m, mode, h / parts, s.ledger_memory.data()->value, s.workspace);
+        op = build_step_operators(m, mode, h / parts, s.ledger_memory.data()->value, s.workspace,
+                                  s.workspace_index.data());
     }
     Sample& at = s.middle;
     const int n = mode.order, block = padded(n);

@@ -117,6 +117,7 @@ ModeSizes::ModeSizes(const ModelData& m) {
     force_torques = panel_size(m.torques + translating, m.forces);
     balance = panel_size(m.torques, m.columns + m.torques);
     operators = m.states_padded * (3 * m.columns + 5 * m.forces) + 4 * panel_rows;  // of one length
+    sparse_rates = SparseRates::most_entries(m.states);
     key = (m.contact_bytes + 7) / 8 * 8;
 }
 
@@ -139,12 +140,13 @@ int workspace_doubles(const ModelData& m) noexcept {
                      + padded(n) * n        // B
                      + 4 * (m.states_padded + m.torques) + m.states_padded * m.columns +
                      padded(m.torques) * m.columns + coordinates_workspace(m);
-    const int exponential = 16 * square + 3 * m.states_padded * (m.columns + 5 * m.forces);
+    const int exponential =
+        16 * square + 3 * m.states_padded * (m.columns + 5 * m.forces) + sparse_workspace_doubles(m.states);
     return std::max(mode, exponential) + 64;
 }
 
 int workspace_integers(const ModelData& m) noexcept {
-    return std::max(m.masses, m.torques);
+    return std::max({m.masses, m.torques, sparse_workspace_integers(m.states)});
 }
 
 void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers) SHIFTRIG_REALTIME {

@@ -22,6 +22,7 @@
 #include "plant/laws/sensor.h"
 #include "plant/model_data.h"
 #include "plant/samples.h"
+#include "plant/sparse_exponential.h"
 
 namespace shiftrig::plant::detail {
 
@@ -70,6 +71,7 @@ struct Mode {
     // its scale, then the reciprocals: from these the operators of any length are built.
     double *scaled_rates = nullptr, *energy_root = nullptr;
     double rate_norm = 0;
+    SparseRates sparse_rates;  // L of these once more, where that is large and almost empty
     TreeMode* tree = nullptr;  // instead of all matrices, on the engine for long chains
 };
 
@@ -81,12 +83,12 @@ inline bool is_shaft_closed(const ModelData& m, const Mode& mode, int shaft) noe
 // Room that a mode and its operators take, in doubles and ints.
 struct ModeSizes {
     int basis = 0, view = 0, mobility = 0, rates = 0, scaled_rates = 0, energy_root = 0, torques = 0,
-        force_torques = 0, balance = 0, operators = 0;
+        force_torques = 0, balance = 0, operators = 0, sparse_rates = 0;
     int key = 0;  // bytes, a multiple of 8
     explicit ModeSizes(const ModelData& model);
     int doubles() const noexcept {
         return basis + view + mobility + rates + scaled_rates + energy_root + torques + force_torques +
-               balance + 2 * operators;
+               balance + 2 * operators + sparse_rates;
     }
 };
 
@@ -109,7 +111,7 @@ bool wedges(const ModelData& model, const Mode& mode) SHIFTRIG_REALTIME;  // Mod
 // Mode::row_links from its rows, and Mode::rests.
 void list_row_links(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
 
-// Mode::scaled_rates with its norm and energy_root, from its view and rates.
+// Mode::scaled_rates with its norm, energy_root and sparse_rates, from its view and rates.
 void scale_rates(const ModelData& model, Mode& mode) SHIFTRIG_REALTIME;
 
 // Everything of a mode but its step operators. `mode.key` is set by the caller.
@@ -117,7 +119,7 @@ void build_mode(const ModelData& model, Mode& mode, double* workspace, int* inte
 
 // The operators of one step of `length` in the mode, in `memory` of ModeSizes::operators doubles.
 StepOperators build_step_operators(const ModelData& model, const Mode& mode, double length, double* memory,
-                                   double* workspace) SHIFTRIG_REALTIME;
+                                   double* workspace, int* integers) SHIFTRIG_REALTIME;
 
 // What the inputs say of a pair, as long as they stay the same.
 struct PairCommand {

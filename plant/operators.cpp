@@ -32,7 +32,9 @@ OperatorsData::OperatorsData(const ModelData& m) {
     const auto rows = static_cast<std::size_t>(m.torques), states = static_cast<std::size_t>(m.states);
     const auto meshes = static_cast<std::size_t>(m.meshes);
     keys.assign(modes.size() * 2 * key_bytes, 0);
-    const std::size_t row_integers = rows + states + static_cast<std::size_t>(m.pairs);
+    const auto entries = static_cast<std::size_t>(m.tree ? 0 : SparseRates::most_entries(m.states));
+    const auto sparse = static_cast<std::size_t>(m.tree ? 0 : SparseRates::integers(m.states));
+    const std::size_t row_integers = rows + states + static_cast<std::size_t>(m.pairs) + sparse;
     row_memory.assign(modes.size() * row_integers, 0);
     link_memory.resize(modes.size() * rows);
     const std::size_t relations = meshes * static_cast<std::size_t>(m.tree ? 0 : m.contact_bytes);
@@ -45,6 +47,11 @@ OperatorsData::OperatorsData(const ModelData& m) {
         modes[i].rows = row_memory.data() + i * row_integers;
         modes[i].coordinates = modes[i].rows + rows;
         modes[i].loop = modes[i].coordinates + states;
+        SparseRates& rates = modes[i].sparse_rates;
+        rates.column = modes[i].loop + m.pairs;
+        rates.row = rates.column + entries;
+        rates.row_begin = rates.row + entries;
+        rates.column_begin = rates.row_begin + (sparse - 2 * entries) / 2;
         modes[i].row_links = link_memory.data() + i * rows;
         modes[i].loss_share = share_memory.data() + i * (shares + meshes);
         modes[i].family_mobility = modes[i].loss_share + shares;
@@ -90,6 +97,7 @@ void OperatorsData::place_matrices(const ModelData& m) {
         mode.ledger_memory = take(sizes.operators);
         mode.scaled_rates = take(sizes.scaled_rates);
         mode.energy_root = take(sizes.energy_root);
+        mode.sparse_rates.value = take(sizes.sparse_rates);
     }
 }
 
@@ -147,12 +155,13 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
         build_mode(m, *oldest, scratch.workspace, scratch.workspace_index.data());
         std::fill(oldest->family_mobility, oldest->family_mobility + m.meshes, -1.);
         const double h = m.options.step_size;
-        oldest->step = build_step_operators(m, *oldest, h, oldest->step_memory, scratch.workspace);
+        oldest->step = build_step_operators(m, *oldest, h, oldest->step_memory, scratch.workspace,
+                                            scratch.workspace_index.data());
         const int halvings = oldest->step.halvings;
         oldest->ledger_parts = halvings == 0 ? 1 : halvings == 1 ? 4 : 4 << std::min(halvings, 6);
         if (oldest->ledger_parts > 1) {
             oldest->ledger = build_step_operators(m, *oldest, h / oldest->ledger_parts, oldest->ledger_memory,
-                                                  scratch.workspace);
+                                                  scratch.workspace, scratch.workspace_index.data());
         }
     }
     list_row_links(m, *oldest);

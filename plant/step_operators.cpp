@@ -27,10 +27,18 @@ struct Algebra {
     double* panels;  // stride × stride
 
     int size() const noexcept { return stride * n; }
-    // c (columns wide) = a b
+    void take(const double* a) const { to_panels(a, n, n, panels); }
+    // c (columns wide) = a b, with the matrix a that was taken last
+    void times(const double* b, int columns, double* c) const {
+        if (n < SparseRates::smallest) {
+            kernel.multiply_each(panels, stride, n, b, columns, c);
+        } else {
+            kernel.many(panels, stride, n, b, columns, c);
+        }
+    }
     void multiply(const double* a, const double* b, int columns, double* c) const {
-        to_panels(a, n, n, panels);
-        kernel.multiply_each(panels, stride, n, b, columns, c);
+        take(a);
+        times(b, columns, c);
     }
     void combine(std::initializer_list<Term> terms, int count, double* sum) const {
         kernel.algebra.combine(terms.begin(), static_cast<int>(terms.size()), count, sum);
@@ -116,10 +124,11 @@ void scale_rates(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
         }
         if (c < n) mode.rate_norm = std::max(mode.rate_norm, sum);
     }
+    list_entries(scaled, n, stride, mode.sparse_rates);
 }
 
 StepOperators build_step_operators(const ModelData& m, const Mode& mode, double length, double* memory,
-                                   double* workspace) SHIFTRIG_REALTIME {
+                                   double* workspace, int* integers) SHIFTRIG_REALTIME {
     const int n = mode.order, stride = padded(n), size = stride * n, columns = n + m.forces;
     const int force_size = stride * m.forces;
     StepOperators operators;
@@ -140,17 +149,34 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
     double *const a1 = acting, *const a2 = a1 + force_size, *const a3 = a2 + force_size;
     double* const sum = take(force_size);
 
+    const double* const force = mode.scaled_rates + size;
     double scale = 0.5 * length;
     while (mode.rate_norm * scale > 0.5 && operators.halvings < 60) {
         scale *= 0.5;
         ++operators.halvings;
     }
-    algebra.combine({{scale, mode.scaled_rates}}, size, z);
-    sum_series(algebra, z, product, phi);
-    for (int k = 0; k < operators.halvings; ++k) {
-        algebra.multiply(phi0, phi, 4 * n, product);
-        double_length(algebra, product + size, size, others);
-        std::copy(product, product + size, phi0);
+    if (mode.sparse_rates.entries > 0) {
+        int doublings = operators.halvings;
+        for (; doublings > 0 && 2 * scale * mode.rate_norm <= largest_sparse_norm; --doublings) scale *= 2;
+        sparse_exponential(m.kernel, mode.sparse_rates, scale, scale * mode.rate_norm, force, m.forces,
+                           stride, phi0, acting, next, integers);
+        for (; doublings > 0; --doublings) {
+            algebra.take(phi0);
+            algebra.times(acting, 3 * m.forces, product);
+            double_length(algebra, product, force_size, acting);
+            algebra.times(phi0, n, product);
+            std::copy(product, product + size, phi0);
+        }
+    } else {
+        algebra.combine({{scale, mode.scaled_rates}}, size, z);
+        sum_series(algebra, z, product, phi);
+        for (int k = 0; k < operators.halvings; ++k) {
+            algebra.multiply(phi0, phi, 4 * n, product);
+            double_length(algebra, product + size, size, others);
+            std::copy(product, product + size, phi0);
+        }
+        for (int k = 0; k < 3; ++k)
+            algebra.multiply(others + k * size, force, m.forces, acting + k * force_size);
     }
 
     // Into a block of an operator so many blocks high, from this column on, back in physical variables.
@@ -174,8 +200,6 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
     };
 
     // Half the length.
-    const double* const force = mode.scaled_rates + size;
-    for (int k = 0; k < 3; ++k) algebra.multiply(others + k * size, force, m.forces, acting + k * force_size);
     place_transition(0, phi0);
     place_forces(0, a1, 0.5 * length);
     algebra.combine({{2, a2}, {-2, a3}}, force_size, sum);
@@ -184,9 +208,10 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
     place(operators.middle, 1, 0, 2 * m.forces, m.forces, sum, m.forces, 0.5 * length);
 
     // The whole of it.
-    algebra.multiply(phi0, acting, 3 * m.forces, product);
+    algebra.take(phi0);
+    algebra.times(acting, 3 * m.forces, product);
     double_length(algebra, product, force_size, acting);
-    algebra.multiply(phi0, phi0, n, product);
+    algebra.times(phi0, n, product);
     place_transition(1, product);
     place_transition(2, product);
     place_forces(1, a1, -length);

@@ -1,0 +1,5 @@
+if(NOT benchmark_FOUND)
+  find_package(benchmark REQUIRED)
+endif()
+add_executable(gearbox_bench ${CMAKE_CURRENT_LIST_DIR}/gearbox_bench.cpp)
+target_link_libraries(gearbox_bench PRIVATE shiftrig_plant benchmark::benchmark)
