@@ -30,20 +30,32 @@ void combine(const Term* term, int terms, int count, double* sum) SHIFTRIG_REALT
     }
 }
 
+// So many rows from `first` on, which lie side by side in one panel.
+template <int rows>
+inline void place_rows(const Placing& p, int first, const double* source, double factor,
+                       double* panels) noexcept {
+    const int row = p.top + first;
+    const int height = p.rows - row / panel_rows * panel_rows < panel_rows ? 4 : panel_rows;
+    double* at = panels + panel_index(p.rows, p.width, row, p.first_column);
+    const double* from = source + first;
+    double scale[rows];
+    for (int i = 0; i < rows; ++i) scale[i] = factor * p.row_scale[first + i];
+    for (int c = 0; c < p.columns; ++c, at += height, from += p.block_rows) {
+        const double of_column = p.column_scale ? p.column_scale[c] : 1;
+        double values[rows];
+        for (int i = 0; i < rows; ++i) values[i] = from[i] * scale[i] * of_column;
+        for (int i = 0; i < rows; ++i) at[i] = values[i];
+    }
+}
+
 void place(const Placing& p, const double* source, double factor, double* panels) SHIFTRIG_REALTIME {
-    constexpr int four = 4;  // rows that lie side by side in any panel; blocks are whole fours
-    for (int first = 0; first < p.block_rows; first += four) {
-        const int row = p.top + first;
-        const int height = p.rows - row / panel_rows * panel_rows < panel_rows ? four : panel_rows;
-        double* at = panels + panel_index(p.rows, p.width, row, p.first_column);
-        const double* from = source + first;
-        double scale[four];
-        for (int i = 0; i < four; ++i) scale[i] = factor * p.row_scale[first + i];
-        for (int c = 0; c < p.columns; ++c, at += height, from += p.block_rows) {
-            const double of_column = p.column_scale ? p.column_scale[c] : 1;
-            double values[four];
-            for (int i = 0; i < four; ++i) values[i] = from[i] * scale[i] * of_column;
-            for (int i = 0; i < four; ++i) at[i] = values[i];
+    for (int first = 0; first < p.block_rows;) {  // blocks are whole fours
+        if ((p.top + first) % panel_rows == 0 && first + panel_rows <= p.block_rows) {
+            place_rows<panel_rows>(p, first, source, factor, panels);
+            first += panel_rows;
+        } else {
+            place_rows<4>(p, first, source, factor, panels);
+            first += 4;
         }
     }
 }

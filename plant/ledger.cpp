@@ -99,13 +99,15 @@ void book_finely(Work& w, const Mode& mode) {
     int parts = mode.ledger_parts;
     if (s.used.length != mode.step.length) {
         parts = ledger_parts(mode, h / w.h);
-        op = build_step_operators(m, mode, h / parts, s.ledger_memory.data()->value, s.workspace,
-                                  s.workspace_index.data());
+        op = build_ledger_operators(m, mode, h / parts, s.ledger_memory.data()->value, s.workspace,
+                                    s.workspace_index.data());
     }
     Sample& at = s.middle;
     const int n = mode.order, block = padded(n);
-    double* const at_half = s.vector_a;  // the three blocks of `advance`, of which the last is the end
-    double* const at_end = at_half + 2 * block;
+    // Of the three blocks of `advance` only the last is asked for.
+    const double* const end_from_begin = op.from_begin + 2 * block * (n + m.forces);
+    double* const at_late = s.vector_a;
+    double* const at_end = at_late + block;
     double* const forces = s.vector_c;
     for (int i = 0; i < n; ++i) at_end[i] = s.begin().z[mode.coordinates[i]];
     double external_work = 0;
@@ -134,9 +136,9 @@ void book_finely(Work& w, const Mode& mode) {
             s.input_work += 2 * h / 3 * field;
         }
         if (part == parts) break;
-        m.kernel.multiply(op.from_begin, 3 * block, n + m.forces, at.f - n, nullptr, at_half);
+        m.kernel.multiply(end_from_begin, block, n + m.forces, at.f - n, nullptr, at_end);
         forces_at(s, m.forces, (part + 0.5) / parts, forces);
-        m.kernel.multiply(op.from_half, 2 * block, m.forces, forces, at_half + block, at_half + block);
+        m.kernel.multiply(op.from_half, 2 * block, m.forces, forces, at_late, at_late);
         forces_at(s, m.forces, (part + 1.) / parts, forces);
         m.kernel.multiply(op.from_late, block, m.forces, forces, at_end, at_end);
     }

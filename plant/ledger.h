@@ -16,4 +16,8 @@ double stored_energy(const ModelData& model, const double* z, const unsigned cha
 // Hermite's cubic and forces are taken anew (docs/mechanics.md, Account of energy).
 void book(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
+// The operators of one of those parts, of which only what they give to the end is asked for (step_operators.cpp).
+StepOperators build_ledger_operators(const ModelData& model, const Mode& mode, double length, double* memory,
+                                     double* workspace, int* integers) SHIFTRIG_REALTIME;
+
 }  // namespace shiftrig::plant::detail

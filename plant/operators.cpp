@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "plant/few.h"
+#include "plant/ledger.h"
 #include "plant/modes.h"
 
 namespace shiftrig::plant {
@@ -160,8 +161,9 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
         const int halvings = oldest->step.halvings;
         oldest->ledger_parts = halvings == 0 ? 1 : halvings == 1 ? 4 : 4 << std::min(halvings, 6);
         if (oldest->ledger_parts > 1) {
-            oldest->ledger = build_step_operators(m, *oldest, h / oldest->ledger_parts, oldest->ledger_memory,
-                                                  scratch.workspace, scratch.workspace_index.data());
+            oldest->ledger =
+                build_ledger_operators(m, *oldest, h / oldest->ledger_parts, oldest->ledger_memory,
+                                       scratch.workspace, scratch.workspace_index.data());
         }
     }
     list_row_links(m, *oldest);

@@ -12,6 +12,7 @@
 #include <initializer_list>
 #include <utility>
 
+#include "plant/ledger.h"
 #include "plant/modes.h"
 
 namespace shiftrig::plant::detail {
@@ -127,8 +128,9 @@ void scale_rates(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     list_entries(scaled, n, stride, mode.sparse_rates);
 }
 
-StepOperators build_step_operators(const ModelData& m, const Mode& mode, double length, double* memory,
-                                   double* workspace, int* integers) SHIFTRIG_REALTIME {
+// `end_alone`: nobody asks for what is given to the coordinates half way and at the late stage.
+static StepOperators build(const ModelData& m, const Mode& mode, double length, bool end_alone,
+                           double* memory, double* workspace, int* integers) SHIFTRIG_REALTIME {
     const int n = mode.order, stride = padded(n), size = stride * n, columns = n + m.forces;
     const int force_size = stride * m.forces;
     StepOperators operators;
@@ -155,8 +157,11 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
         scale *= 0.5;
         ++operators.halvings;
     }
-    if (mode.sparse_rates.entries > 0) {
-        int doublings = operators.halvings;
+    const bool sparse = mode.sparse_rates.entries > 0;
+    const bool at_once = end_alone && sparse && length * mode.rate_norm <= largest_sparse_norm;
+    if (sparse) {
+        int doublings = at_once ? 0 : operators.halvings;
+        if (at_once) scale = length;
         for (; doublings > 0 && 2 * scale * mode.rate_norm <= largest_sparse_norm; --doublings) scale *= 2;
         sparse_exponential(m.kernel, mode.sparse_rates, scale, scale * mode.rate_norm, force, m.forces,
                            stride, phi0, acting, next, integers);
@@ -199,21 +204,21 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
         place(operators.from_begin, 3, block, columns, n, source, m.forces, factor);
     };
 
-    // Half the length.
-    place_transition(0, phi0);
-    place_forces(0, a1, 0.5 * length);
-    algebra.combine({{2, a2}, {-2, a3}}, force_size, sum);
-    place(operators.middle, 1, 0, 2 * m.forces, 0, sum, m.forces, 0.5 * length);
-    algebra.combine({{1, a3}, {-0.5, a2}}, force_size, sum);
-    place(operators.middle, 1, 0, 2 * m.forces, m.forces, sum, m.forces, 0.5 * length);
+    if (!at_once) {  // half the length, then the whole of it
+        place_transition(0, phi0);
+        place_forces(0, a1, 0.5 * length);
+        algebra.combine({{2, a2}, {-2, a3}}, force_size, sum);
+        place(operators.middle, 1, 0, 2 * m.forces, 0, sum, m.forces, 0.5 * length);
+        algebra.combine({{1, a3}, {-0.5, a2}}, force_size, sum);
+        place(operators.middle, 1, 0, 2 * m.forces, m.forces, sum, m.forces, 0.5 * length);
 
-    // The whole of it.
-    algebra.take(phi0);
-    algebra.times(acting, 3 * m.forces, product);
-    double_length(algebra, product, force_size, acting);
-    algebra.times(phi0, n, product);
-    place_transition(1, product);
-    place_transition(2, product);
+        algebra.take(phi0);
+        algebra.times(acting, 3 * m.forces, product);
+        double_length(algebra, product, force_size, acting);
+        algebra.times(phi0, n, product);
+        place_transition(1, product);
+    }
+    place_transition(2, at_once ? phi0 : product);
     place_forces(1, a1, -length);
     place(operators.from_half, 2, 0, m.forces, 0, a1, m.forces, 2 * length);
     algebra.combine({{1, a1}, {-3, a2}, {4, a3}}, force_size, sum);
@@ -233,6 +238,16 @@ StepOperators build_step_operators(const ModelData& m, const Mode& mode, double 
             operators.late_reach = std::max(operators.late_reach, reach[i] * length / mode.energy_root[i]);
     }
     return operators;
+}
+
+StepOperators build_step_operators(const ModelData& m, const Mode& mode, double length, double* memory,
+                                   double* workspace, int* integers) SHIFTRIG_REALTIME {
+    return build(m, mode, length, false, memory, workspace, integers);
+}
+
+StepOperators build_ledger_operators(const ModelData& m, const Mode& mode, double length, double* memory,
+                                     double* workspace, int* integers) SHIFTRIG_REALTIME {
+    return build(m, mode, length, true, memory, workspace, integers);
 }
 
 }  // namespace shiftrig::plant::detail

@@ -1,0 +1,3 @@
+add_executable(sparse_exponential_test ${CMAKE_CURRENT_LIST_DIR}/sparse_exponential_test.cpp)
+target_link_libraries(sparse_exponential_test PRIVATE shiftrig_plant GTest::gtest_main)
+gtest_discover_tests(sparse_exponential_test)
