@@ -190,76 +190,97 @@ const double* stage_loads(const Work& w, Sample& s) noexcept {
 
 // Torques that no contact state concerns, rates of the auxiliary states, and what the laws press together, added to
 // what is in f and load. They read speeds where they act: f[force] is paid for by −slip[force].
-void law_forces(const Work& w, Sample& s) noexcept {
+
+void tyre_forces(const Work& w, Sample& s) noexcept {
     const ModelData& m = w.model;
-    const Description& d = m.description;
-    const OperatorsData& known = w.operators;
-    const double* const slip = s.slip;
-    double *const f = s.f, *const load = s.load;
+    const BrixiusTyre* tyre = m.description.tyres.data();
+    const TyreSoil* soil = w.operators.soils.data();
     const double* auxiliary = s.auxiliary;
-    double* rate = s.auxiliary_rate;
-    const BrixiusTyre* tyre = d.tyres.data();
-    const TyreSoil* soil = known.soils.data();
-    double *tyre_slip = s.tyre_slip, *traction = s.tyre_force;
+    double *rate = s.auxiliary_rate, *slip = s.tyre_slip, *traction = s.tyre_force;
     for (const TyreLaw& law : m.tyres) {
         const TyreMotion motion =
-            tyre_motion(*tyre, *soil, *auxiliary++, -slip[law.wheel_force], -slip[law.body_force]);
+            tyre_motion(*tyre, *soil, *auxiliary++, -s.slip[law.wheel_force], -s.slip[law.body_force]);
         *rate++ = motion.rate;
-        *tyre_slip++ = motion.slip;
+        *slip++ = motion.slip;
         const double force = tyre_force(*soil, motion.slip);
         *traction++ = force;
-        f[law.wheel_force] -= force * tyre->radius;
-        f[law.body_force] += force;
-        load[law.resistance] += tyre_resistance(*soil, motion.slip);
+        s.f[law.wheel_force] -= force * tyre->radius;
+        s.f[law.body_force] += force;
+        s.load[law.resistance] += tyre_resistance(*soil, motion.slip);
         ++tyre;
         ++soil;
     }
-    const Engine* engine = d.engines.data();
-    const EngineSetting* setting = known.engine_settings.data();
+}
+
+void engine_forces(const Work& w, Sample& s) noexcept {
+    const ModelData& m = w.model;
+    const Engine* engine = m.description.engines.data();
+    const EngineSetting* setting = w.operators.engine_settings.data();
     const EngineMode* mode = w.scratch.engine_modes.data();
-    double *engine_torque_shown = s.engine_torque, *full_load_shown = s.engine_full_load;
+    const double* auxiliary = s.auxiliary + m.tyres.size();  // those of tyres stand before
+    double* rate = s.auxiliary_rate + m.tyres.size();
+    double *torque_shown = s.engine_torque, *full_load_shown = s.engine_full_load;
     for (const EngineLaw& law : m.engines) {
-        const double speed = -slip[law.force];
+        const double speed = -s.slip[law.force];
         const double full = full_load(*engine, law.full_load, speed);
         *full_load_shown++ = full;
         const EngineState state{auxiliary[0], auxiliary[1]};
         const EngineDrive drive = engine_drive(*engine, *setting, state, *mode, speed, full);
         rate[0] = drive.rate.torque;
         rate[1] = drive.rate.boost;
-        *engine_torque_shown++ = drive.torque;
-        f[law.force] += drive.torque;
-        if (law.pair >= 0) load[law.pair] = stalled_friction_capacity(*engine, *mode, speed);
+        *torque_shown++ = drive.torque;
+        s.f[law.force] += drive.torque;
+        if (law.pair >= 0) s.load[law.pair] = stalled_friction_capacity(*engine, *mode, speed);
         auxiliary += 2;
         rate += 2;
         ++engine;
         ++setting;
         ++mode;
     }
-    const TorqueConverter* converter = d.converters.data();
-    double* converter_torque = s.converter;
-    for (const ConverterLaw& law : m.converters) {
+}
+
+void converter_forces(const Work& w, Sample& s) noexcept {
+    const TorqueConverter* converter = w.model.description.converters.data();
+    double* shown = s.converter;
+    for (const ConverterLaw& law : w.model.converters) {
         const ConverterTorques torques =
-            converter_torques(*converter++, -slip[law.pump_force], -slip[law.turbine_force]);
-        *converter_torque++ = torques.pump;
-        *converter_torque++ = torques.turbine;
-        f[law.pump_force] -= torques.pump;
-        f[law.turbine_force] += torques.turbine;
+            converter_torques(*converter++, -s.slip[law.pump_force], -s.slip[law.turbine_force]);
+        *shown++ = torques.pump;
+        *shown++ = torques.turbine;
+        s.f[law.pump_force] -= torques.pump;
+        s.f[law.turbine_force] += torques.turbine;
     }
-    const TorqueSource* source = d.sources.data();
-    const double* told = known.source_inputs.data();
-    for (const SourceLaw& law : m.sources) {
+}
+
+void source_forces(const Work& w, Sample& s) noexcept {
+    const TorqueSource* source = w.model.description.sources.data();
+    const double* told = w.operators.source_inputs.data();
+    for (const SourceLaw& law : w.model.sources) {
         double torque = *told++;
         if (!source->waveform.pieces.empty()) torque += waveform(source->waveform, s.at.time, s.at.side);
         if (source->quadratic != 0)
-            torque += source->quadratic * slip[law.force] * std::fabs(slip[law.force]);
-        f[law.force] += torque;
+            torque += source->quadratic * s.slip[law.force] * std::fabs(s.slip[law.force]);
+        s.f[law.force] += torque;
         ++source;
     }
-    const Road* road = d.roads.data();
-    const double* grade = known.grade_forces.data();
-    for (const int force : m.road_force) f[force] += *grade++ + air_force(*road++, -slip[force]);
+}
+
+void ground_forces(const Work& w, Sample& s) noexcept {
+    const ModelData& m = w.model;
+    const Road* road = m.description.roads.data();
+    const double* grade = w.operators.grade_forces.data();
+    for (const int force : m.road_force) s.f[force] += *grade++ + air_force(*road++, -s.slip[force]);
     for (const PloughLaw& law : m.ploughs)
-        load[law.pair] += plough_draft(law.curve, -slip[law.force], known.draft);
+        s.load[law.pair] += plough_draft(law.curve, -s.slip[law.force], w.operators.draft);
+}
+
+void law_forces(const Work& w, Sample& s) noexcept {
+    const ModelData& m = w.model;
+    if (!m.tyres.empty()) tyre_forces(w, s);
+    if (!m.engines.empty()) engine_forces(w, s);
+    if (!m.converters.empty()) converter_forces(w, s);
+    if (!m.sources.empty()) source_forces(w, s);
+    if (!m.road_force.empty() || !m.ploughs.empty()) ground_forces(w, s);
 }
 
 }  // namespace
