@@ -10,6 +10,7 @@
 
 #include "plant/connectors.h"
 #include "plant/kernels.h"
+#include "plant/laws/converter.h"
 #include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/lag.h"
@@ -65,6 +66,7 @@ struct TyreLaw {
 struct ConverterLaw {
     int pump = -1, turbine = -1;
     int pump_force = -1, turbine_force = -1;
+    std::vector<ConverterKnot> knots;
 };
 struct EngineLaw {
     int mass = -1, pair = -1;

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "plant/laws/converter.h"
 #include "plant/laws/friction.h"
 #include "plant/laws/heat.h"
 #include "plant/laws/sensor.h"
@@ -36,9 +37,10 @@ void divide_step(ModelData& m, double reach, int most) {
 // see it, and its events have to have room. Forces that swing with it (a load that grows with speed) cost a part of turn
 // ωh a phase of order (ωh)⁴, which hundreds of contacts add up: half a radian, not one. Friction that rises with speed is
 // a damper that the step does not take exactly: its parts are to be short against its time constant. Such that falls makes
-// a slip grow by that time constant.
+// a slip grow by that time constant. A converter near synchronous speed is such a damper as well.
 void bound_step(ModelData& m) {
-    constexpr int most_for_flanks = 1 << 14, most_for_friction = Description::most_parts;
+    constexpr int most_for_flanks = 1 << 14, most_for_damping = Description::most_parts;
+    constexpr double usual_speed = 200;  // of an engine [rad/s]
     m.maximum_events = m.description.maximum_events;
     m.maximum_parts = m.description.maximum_parts;
     for (int k = 0; k < m.pairs; ++k) {
@@ -46,7 +48,14 @@ void bound_step(ModelData& m) {
         const Steepness steep = steepness(law.friction);
         const double rate = law.full_load * std::max(steep.rise, steep.fall) *
                             mobility_between(m, m.structure.pairs[static_cast<std::size_t>(k)].links);
-        divide_step(m, 4 * rate * m.options.step_size, most_for_friction);
+        divide_step(m, 4 * rate * m.options.step_size, most_for_damping);
+    }
+    for (const TorqueConverter& c : m.description.converters) {
+        const double slope = 2 * usual_speed * steepest_coefficient(c);
+        for (const std::string& side : {c.pump, c.turbine}) {
+            const double mobility = mobility_between(m, {Link{m.structure.mass(side), 1}, Link{}});
+            divide_step(m, 4 * slope * mobility * m.options.step_size, most_for_damping);
+        }
     }
     for (const BacklashLaw& law : m.backlashes) {
         const double mobility =

@@ -5,6 +5,8 @@
 
 #include "plant/ark3.h"
 #include "plant/devices.h"
+#include "plant/laws/engine.h"
+#include "plant/laws/tyre.h"
 #include "plant/modes.h"
 
 namespace shiftrig::plant::detail {
@@ -39,6 +41,28 @@ bool takes_forces_amiss(const Work& w, const double* late, double reach, const C
     if (wrong == 0) return false;
     const double much = speed_tolerance * loops.largest(end.z, m.masses);
     return (reach * wrong > much && change() > much) || exceeds(w, wrong, force_tolerance);
+}
+
+// Slow states (slip of tyres, torque and boost of engines) stand on the same stage, by a sixth of the part: the torque that
+// they would be off by. A wheel that swings on its tyre shows in the forces twice a turn not at all.
+double slow_states_amiss(const Work& w) {
+    const ModelData& m = w.model;
+    const Sample &late = w.scratch.late, &end = w.scratch.end();
+    const auto wrong = [&](std::size_t i) {
+        return std::fabs(end.auxiliary_rate[i] - late.auxiliary_rate[i]);
+    };
+    double most = 0;
+    std::size_t next = 0;
+    for (std::size_t t = 0; t < m.tyres.size(); ++t) {
+        const double slope = tyre_force_slope(w.operators.soils[t]);
+        most = std::max(most, slope * std::max(1., m.description.tyres[t].radius) * wrong(next++));
+    }
+    for (std::size_t e = 0; e < m.engines.size(); ++e) {
+        const double boosted = 1 - m.description.engines[e].turbo_instant_fraction;
+        most = std::max(most, wrong(next++));
+        most = std::max(most, boosted * end.engine_full_load[e] * wrong(next++));
+    }
+    return most * (end.at.time - w.scratch.begin().at.time) / 6;
 }
 
 // Friction that falls as the slip grows lets it grow by itself, as e^(λt): what is amiss while it is small grows with it,
@@ -125,7 +149,11 @@ bool is_dense_coarse(Work& w, const Mode& mode) {
         }
         return moved;
     };
-    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) ||
+    const auto takes_slow_states_amiss = [&] {
+        const double torque = m.auxiliary > 0 ? slow_states_amiss(w) : 0;
+        return torque > 0 && exceeds(w, torque, force_tolerance);
+    };
+    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || takes_slow_states_amiss() ||
            friction_outruns_stages(w, [&](int k) { return dense_answer(w, mode, k); }) || hides_swing(w);
 }
 
@@ -167,28 +195,96 @@ bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     return mode.tree ? is_tree_coarse(w, mode) : is_dense_coarse(w, mode);
 }
 
-double first_knot(const Work& w) SHIFTRIG_REALTIME {
-    constexpr double edge = 1e-3;  // nearer to an end of the part than this is there
+namespace {
+
+// The first of the knots that the part comes upon. Of each: what is zero there, at begin, half way and end.
+class FirstKnot {
+  public:
+    explicit FirstKnot(const Work& w)
+        : begin(w.scratch.begin()), half(w.scratch.half), end(w.scratch.end()) {}
+    void consider(double g0, double gm, double g1) {
+        if (!(g0 * g1 < 0)) return;
+        // On the parabola through the three, from the straight line.
+        const double a = 2 * (g0 - 2 * gm + g1), b = 4 * gm - 3 * g0 - g1;
+        double theta = g0 / (g0 - g1);
+        for (int i = 0; i < 2; ++i) {
+            const double slope = b + 2 * a * theta;
+            if (slope != 0) theta -= (g0 + theta * (b + theta * a)) / slope;
+        }
+        constexpr double edge = 1e-3;  // nearer to an end of the part than this is there
+        if (theta > edge && theta < 1 - edge) first = std::min(first, theta);
+    }
+    template <typename Quantity>
+    void consider(const Work& w, const Quantity& zero) {
+        const double g0 = zero(begin), g1 = zero(end);
+        // The engine for long chains has no stage half way.
+        consider(g0, w.model.tree ? 0.5 * (g0 + g1) : zero(half), g1);
+    }
+    const Sample &begin, &half, &end;
     double first = 1;
+};
+
+void knots_of_friction(const Work& w, FirstKnot& knots) {
     for (const int k : w.model.tabled_pairs) {
         if (!slips(w.contact[k])) continue;
-        const double s0 = std::fabs(w.scratch.begin().slip[k]), s1 = std::fabs(w.scratch.end().slip[k]);
-        // The engine for long chains has no stage half way.
-        const double sm = w.model.tree ? 0.5 * (s0 + s1) : std::fabs(w.scratch.half.slip[k]);
         for (const auto& [knot, factor] :
              *w.model.pair_laws[static_cast<std::size_t>(k)].friction.factor_over_slip) {
-            if ((knot - s0) * (knot - s1) >= 0) continue;
-            // On the parabola through the three, from the straight line.
-            const double a = 2 * (s0 - 2 * sm + s1), b = 4 * sm - 3 * s0 - s1;
-            double theta = (knot - s0) / (s1 - s0);
-            for (int i = 0; i < 2; ++i) {
-                const double slope = b + 2 * a * theta;
-                if (slope != 0) theta -= (s0 + theta * (b + theta * a) - knot) / slope;
-            }
-            if (theta > edge && theta < 1 - edge) first = std::min(first, theta);
+            const double at = knot;
+            knots.consider(w, [=](const Sample& s) { return std::fabs(s.slip[k]) - at; });
         }
     }
-    return first;
+}
+
+void knots_of_converters(const Work& w, FirstKnot& knots) {
+    for (const ConverterLaw& law : w.model.converters) {
+        for (const ConverterKnot& knot : law.knots) {
+            knots.consider(w, [&](const Sample& s) {
+                return knot.pump * s.slip[law.pump_force] + knot.turbine * s.slip[law.turbine_force];
+            });
+        }
+    }
+}
+
+// Where the governor comes upon a limit or leaves it, and bends of the full-load curve under it.
+void knots_of_engines(const Work& w, FirstKnot& knots) {
+    const ModelData& m = w.model;
+    for (std::size_t e = 0; e < m.engines.size(); ++e) {
+        const EngineSetting& set = w.operators.engine_settings[e];
+        if (w.scratch.engine_modes[e] != EngineMode::running || set.fuel_cut) continue;
+        const Engine& engine = m.description.engines[e];
+        const EngineLaw& law = m.engines[e];
+        const auto boost = m.tyres.size() + 2 * e + 1;
+        const auto demand = [&](const Sample& s) {
+            return engine_demand(engine, set, -s.slip[law.force], s.engine_full_load[e], s.auxiliary[boost]);
+        };
+        knots.consider(w, [&](const Sample& s) {
+            const EngineDemand d = demand(s);
+            return d.governor - std::min(d.available, set.most);
+        });
+        knots.consider(w, [&](const Sample& s) {
+            const EngineDemand d = demand(s);
+            return d.governor + d.friction;
+        });
+        const EngineDemand at_begin = demand(knots.begin);
+        if (at_begin.governor < at_begin.available) continue;
+        knots.consider(w, [&](const Sample& s) { return demand(s).available - set.most; });
+        const auto bend = [&](double speed) {
+            knots.consider(w, [&](const Sample& s) { return -s.slip[law.force] - speed; });
+        };
+        for (const auto& [speed, torque] : engine.full_load) bend(speed);
+        bend(engine.fade_from);
+        bend(engine.fade_to);
+    }
+}
+
+}  // namespace
+
+double first_knot(const Work& w) SHIFTRIG_REALTIME {
+    FirstKnot knots(w);
+    knots_of_friction(w, knots);
+    knots_of_converters(w, knots);
+    knots_of_engines(w, knots);
+    return knots.first;
 }
 
 }  // namespace shiftrig::plant::detail

@@ -10,8 +10,8 @@ namespace shiftrig::plant::detail {
 // contacts change, nor forces taken from the stages; that along the tree does not take swings exactly either.
 bool is_coarse(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
-// Where between begin and end the first slip comes upon a knot of its friction table, beyond which the part's few samples
-// would see another slope. 1: nowhere.
+// Where between begin and end a law first comes upon a knot (of a friction table, of a converter, of an engine's curve or its
+// governor's limits), beyond which the part's few samples would see another slope. 1: nowhere.
 double first_knot(const Work& work) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

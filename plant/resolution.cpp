@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "plant/format.h"
+#include "plant/laws/converter.h"
 #include "plant/laws/friction.h"
 #include "plant/laws/tyre.h"
 #include "plant/model_data.h"
@@ -79,13 +80,9 @@ class Answers {
         of_square("source \"" + source.name + "\": its drag", source.mass, source.quadratic);
     }
     void of(const TorqueConverter& converter) {
-        double least = converter.k_over_speed_ratio.front().second, most = 0;
-        for (const auto& [ratio, k] : converter.k_over_speed_ratio) least = std::min(least, k);
-        for (const auto& [ratio, torque] : converter.torque_ratio_over_speed_ratio)
-            most = std::max(most, torque);
         const std::string name = "converter \"" + converter.name + "\": its torque";
-        of_square(name, converter.pump, 1 / (least * least));
-        of_square(name, converter.turbine, most / (least * least));
+        for (const std::string& side : {converter.pump, converter.turbine})
+            of_square(name, side, steepest_coefficient(converter));
     }
 
   private:

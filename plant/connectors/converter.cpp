@@ -1,6 +1,7 @@
 #include "plant/connectors/converter.h"
 
 #include "plant/check.h"
+#include "plant/laws/converter.h"
 #include "plant/math/table.h"
 #include "plant/model_builder.h"
 #include "plant/shown.h"
@@ -56,7 +57,7 @@ void add_law(detail::ModelBuilder& builder, const TorqueConverter& c) {
     detail::ModelData& m = builder.model;
     const int pump = m.structure.mass(c.pump), turbine = m.structure.mass(c.turbine);
     const int pump_force = builder.external(pump), turbine_force = builder.external(turbine);
-    m.converters.push_back({pump, turbine, pump_force, turbine_force});
+    m.converters.push_back({pump, turbine, pump_force, turbine_force, converter_knots(c)});
     m.loses_in_fields = true;
 }
 

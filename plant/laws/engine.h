@@ -84,15 +84,22 @@ inline EngineSetting engine_setting(const Engine& p, double peak, const EngineIn
             rate(p.turbo_lag)};
 }
 
-inline double torque_demand(const Engine& p, const EngineSetting& set, double speed, double full,
-                            double boost) noexcept {
-    const double friction = engine_friction(p, speed);
-    if (set.fuel_cut) return -friction;
+// Between which limits the governor asks for how much.
+struct EngineDemand {
+    double governor = 0, available = 0, friction = 0;  // [Nm]
+};
+inline EngineDemand engine_demand(const Engine& p, const EngineSetting& set, double speed, double full,
+                                  double boost) noexcept {
     const double share =
         p.turbo_lag > 0 ? p.turbo_instant_fraction + (1 - p.turbo_instant_fraction) * boost : 1;
-    const double upper = std::min(full * share, set.most);
-    const double wanted = p.governor_slope * (set.no_load_speed - speed);
-    return std::max(-friction, std::min(wanted, upper));
+    return {p.governor_slope * (set.no_load_speed - speed), full * share, engine_friction(p, speed)};
+}
+
+inline double torque_demand(const Engine& p, const EngineSetting& set, double speed, double full,
+                            double boost) noexcept {
+    const EngineDemand d = engine_demand(p, set, speed, full, boost);
+    if (set.fuel_cut) return -d.friction;
+    return std::max(-d.friction, std::min(d.governor, std::min(d.available, set.most)));
 }
 
 inline double starter_torque(const Engine& p) noexcept {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tests/plant/comparison.h"
+#include "tests/plant/random_vehicles.h"
 #include "tests/plant/reference/cases.h"
 #include "tests/plant/rig.h"
 
@@ -333,6 +334,97 @@ TEST(RandomSystems, AChaoticRattleCountsAsSensitiveNotAsADifference) {
     const Comparison c = compare(random_system_with_backlashes(208, options.seconds), 208, options);
     EXPECT_EQ(name(c.outcome), std::string("sensitive"));
     EXPECT_TRUE(c.broken.empty());
+}
+
+TEST(RandomVehicles, AFixedSubsetAgreesWithTheReferenceSolver) {
+    ComparisonOptions options;
+    options.quick = true;
+    int agreeing = 0;
+    for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+        const RandomSystem system = random_vehicle(seed, options.seconds);
+        const Comparison c = compare(system, seed, options);
+        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
+        EXPECT_TRUE(c.outcome == Outcome::agrees || c.outcome == Outcome::sensitive)
+            << "seed " << seed << " " << name(c.outcome) << ": " << c.worst << " tolerances on "
+            << c.worst_signal << " at " << c.worst_time << " s\n"
+            << describe(system.description);
+        EXPECT_EQ(c.fall_backs, 0) << "seed " << seed;
+        agreeing += c.outcome == Outcome::agrees;
+    }
+    EXPECT_GE(agreeing, 29);
+}
+
+// Turbines of 2…10 g m² near synchronous speed answer within 15…150 µs (9, 85); one is turned backwards faster than its pump (36).
+TEST(RandomVehicles, LightTurbinesAndTurbinesTurnedBackwardsAgreeWithTheReference) {
+    ComparisonOptions options;
+    options.quick = true;
+    for (const std::uint64_t seed : {9u, 36u, 85u}) {
+        const Comparison c = compare(random_vehicle(seed, options.seconds), seed, options);
+        EXPECT_EQ(name(c.outcome), std::string("agrees"))
+            << "seed " << seed << ": " << c.worst << " tolerances on " << c.worst_signal;
+    }
+}
+
+// A wheel that swings at 1150 rad/s on its tyre: twice a turn the last stage takes the forces for what they are, and one step in
+// thirty was taken whole that needs sixteen parts (1183). Knots between the samples of a step: of the converter's tables (953, 882),
+// of the engine's curve and where its governor leaves it (91, 863).
+TEST(RandomVehicles, WheelsThatSwingOnTheirTyresAndKnotsOfLawsAgreeWithTheReference) {
+    ComparisonOptions options;
+    options.quick = true;
+    for (const std::uint64_t seed : {91u, 863u, 882u, 953u, 1183u}) {
+        const Comparison c = compare(random_vehicle(seed, options.seconds), seed, options);
+        EXPECT_EQ(name(c.outcome), std::string("agrees"))
+            << "seed " << seed << ": " << c.worst << " tolerances on " << c.worst_signal;
+    }
+}
+
+// The torque of this one falls by half from a speed ratio of 0.89 to 0.93.
+TEST(Fields, AConverterThatComesUponAKnotWithinAStepBendsThere) {
+    RandomSystem system;
+    Description& d = system.description;
+    d.masses = {mass("pump", 1, 100), mass("turbine", 0.03, 60), mass("load", 1, 60)};
+    d.shafts = {{"shaft", "turbine", "load", 4000, 5, 0}};
+    d.sources = {source("pump", constant(300)), source("load", constant(-20))};
+    TorqueConverter c;
+    c.name = "converter", c.pump = "pump", c.turbine = "turbine";
+    c.k_over_speed_ratio = {{0, 8}, {0.89, 9}, {0.93, 12.5}, {1, 16}};
+    c.torque_ratio_over_speed_ratio = {{0, 2}, {0.85, 1}};
+    d.converters = {c};
+    const Comparison result = compare(system, 1, {});
+    EXPECT_EQ(name(result.outcome), std::string("agrees"));
+    EXPECT_LT(result.worst, 0.2) << result.worst_signal << " at " << result.worst_time;
+    EXPECT_EQ(result.coarse, 0);
+}
+
+TEST(RandomVehicles, WithWetClutchesBehindValvesAgreeWithTheReference) {
+    ComparisonOptions options;
+    options.quick = true;
+    int agreeing = 0;
+    for (std::uint64_t seed = 1; seed <= 15; ++seed) {
+        const RandomSystem system = random_vehicle_with_wet_clutches(seed, options.seconds);
+        const Comparison c = compare(system, seed, options);
+        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
+        EXPECT_TRUE(c.outcome == Outcome::agrees || c.outcome == Outcome::sensitive)
+            << "seed " << seed << " " << name(c.outcome) << ": " << c.worst << " tolerances on "
+            << c.worst_signal << " at " << c.worst_time << " s\n"
+            << describe(system.description);
+        agreeing += c.outcome == Outcome::agrees;
+    }
+    EXPECT_GE(agreeing, 14);
+}
+
+// The reference is as good as its steps are short: with a quarter of them it moves by less than a hundredth of the tolerance.
+TEST(RandomVehicles, TheReferenceHasConverged) {
+    const ComparisonOptions options;
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+        const RandomSystem system = random_vehicle(seed, options.seconds);
+        const auto solve = [&](int refinement) {
+            return run_reference(system.description, options, reference::Sharing::free, refinement,
+                                 system.inputs);
+        };
+        const Deviation d = deviation(system.description, solve(4), solve(1), options);
+        EXPECT_LT(d.worst, 0.01) << "seed " << seed << ": " << d.signal << " at " << d.time;
+    }
 }
 
 TEST(RandomSystems, AreTheSameForTheSameSeed) {

@@ -181,6 +181,23 @@ TEST(Converter, TorquePassesThroughZeroAtSynchronousSpeedAndReversesInOverrun) {
     EXPECT_LT(converter_torques(c, 100, 150).turbine, 0) << "overrun brakes the turbine";
 }
 
+// A shuttle reversal, a vehicle that rolls back: the torque ratio of the standing turbine goes over into that of the overrun.
+TEST(Converter, TorqueDoesNotJumpWhereTheTurbineTurnsBackwardsAsFastAsThePump) {
+    const TorqueConverter c = reference_converter();
+    for (const double pump : {150., -80.}) {
+        const ConverterTorques slower = converter_torques(c, pump, -pump * (1 - 1e-9)),
+                               faster = converter_torques(c, pump, -pump * (1 + 1e-9));
+        EXPECT_NEAR(slower.turbine, 2.5 * slower.pump, 1e-9 * std::fabs(slower.turbine));
+        EXPECT_NEAR(faster.pump, slower.pump, 1e-8 * std::fabs(slower.pump));
+        EXPECT_NEAR(faster.turbine, slower.turbine, 1e-8 * std::fabs(slower.turbine));
+    }
+    const ConverterTorques standing = converter_torques(c, 0, -150);
+    EXPECT_EQ(standing.turbine, standing.pump);
+    EXPECT_NEAR(standing.pump, (150 / 6.6) * (150 / 6.6), 1e-9);
+    const ConverterTorques between = converter_torques(c, 75, -150);
+    EXPECT_NEAR(between.turbine, 1.75 * between.pump, 1e-9);
+}
+
 TEST(Converter, NeverMakesEnergy) {
     const TorqueConverter c = reference_converter();
     for (double p = -200; p <= 200; p += 7) {

@@ -157,7 +157,10 @@ Description everything_in_one_line() {
 void expect_agreement(const Description& description, double seconds, double worst, int events) {
     ComparisonOptions options;
     options.seconds = seconds;
-    const Comparison c = compare({description, false, description.name}, 1, options);
+    RandomSystem system;
+    system.description = description;
+    system.traits = description.name;
+    const Comparison c = compare(system, 1, options);
     EXPECT_TRUE(c.broken.empty()) << c.broken.front();
     EXPECT_EQ(name(c.outcome), std::string("agrees")) << c.worst_signal << " at " << c.worst_time << " s";
     EXPECT_LT(c.worst, worst) << c.worst_signal << " at " << c.worst_time << " s";

@@ -4,30 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 #include <vector>
 
+#include "tests/plant/dice.h"
 #include "tests/plant/random_forests.h"
 
 namespace shiftrig {
 namespace {
 
 using namespace plant;
-
-// Draws by hand: the distributions of the standard library differ between implementations.
-class Dice {
-  public:
-    explicit Dice(std::uint64_t seed) : engine_(seed * 0x9E3779B97F4A7C15ull + 1) { engine_.discard(8); }
-    double uniform(double low, double high) {
-        return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1.0p-53;
-    }
-    double logarithmic(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
-    int integer(int low, int high) { return low + static_cast<int>(uniform(0, 1) * (high - low + 1)); }
-    bool chance(double probability) { return uniform(0, 1) < probability; }
-
-  private:
-    std::mt19937_64 engine_;
-};
 
 class Builder {
   public:
@@ -518,6 +503,12 @@ plant::Description mirrored(plant::Description d) {
         freewheel.blocks =
             freewheel.blocks == plant::Sense::forward ? plant::Sense::backward : plant::Sense::forward;
     return d;
+}
+
+std::vector<reference::InputChange> mirrored(std::vector<reference::InputChange> inputs) {
+    for (auto& change : inputs)
+        if (change.input == "environment.grade") change.value = -change.value;
+    return inputs;
 }
 
 plant::Description side_by_side(plant::Description a, const plant::Description& b) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "plant/description.h"
+#include "tests/plant/reference/fields.h"
 
 namespace shiftrig {
 
@@ -14,7 +15,9 @@ struct RandomSystem {
     plant::Description description;
     // No housing, gear or quadratic load: Σ Jω changes by the impulse of the sources alone.
     bool momentum_is_conserved = false;
-    std::string traits;  // "n=7 light lossy loop row shift …", for statistics
+    std::vector<reference::InputChange> inputs;  // throttle, grade, commands; in order of time
+    bool turns_round = true;                     // has no engine: mirrored() is the same machine
+    std::string traits;                          // "n=7 light lossy loop row shift …", for statistics
 };
 
 // The same seed gives the same system on every machine.
@@ -41,6 +44,7 @@ plant::Description side_by_side(plant::Description a, const plant::Description& 
 
 // The same machine with everything turned round: initial speeds and twists, torques, the sense in which freewheels block.
 plant::Description mirrored(plant::Description description);
+std::vector<reference::InputChange> mirrored(std::vector<reference::InputChange> inputs);
 
 // ∫ waveform dt from 0 to `until`.
 double impulse(const plant::Waveform& waveform, double until);

@@ -13,6 +13,7 @@
 #include "io/number.h"
 #include "tests/plant/comparison.h"
 #include "tests/plant/random_forests.h"
+#include "tests/plant/random_vehicles.h"
 
 namespace {
 
@@ -41,6 +42,8 @@ const std::map<std::string, Maker> kinds = {
     {"brakes", random_system_of_brakes},
     {"forests", random_forest},
     {"lossy_forests", random_lossy_forest},
+    {"vehicles", random_vehicle},
+    {"wet_vehicles", random_vehicle_with_wet_clutches},
 };
 
 struct Arguments {
@@ -56,10 +59,11 @@ struct Arguments {
 const char usage[] =
     "usage: shiftrig_random_systems [--count N] [--seed S | --seeds A,B,…] [--seconds T] [--jobs J] "
     "[--substeps K] "
-    "[--kind plain|freewheels|backlashes|tables|brakes|forests|lossy_forests] "
-    "[--mounts] [--method etd3|ark3] [--verbose]\n"
+    "[--kind plain|freewheels|backlashes|tables|brakes|forests|lossy_forests|vehicles|wet_vehicles] "
+    "[--mounts] [--quick] [--method etd3|ark3] [--verbose]\n"
     "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --mounts hangs masses on "
-    "springs to the housing; --verbose prints each that does not agree\n";
+    "springs to the housing; --quick asks only where runs differ whether a machine is sensitive; --verbose "
+    "prints each that does not agree\n";
 
 std::vector<std::uint64_t> numbers(const char* list) {
     std::vector<std::uint64_t> found;
@@ -70,8 +74,8 @@ std::vector<std::uint64_t> numbers(const char* list) {
 bool parse(int argc, char** argv, Arguments& a) {
     for (int i = 1; i < argc; ++i) {
         const std::string key = argv[i];
-        if (key == "--verbose" || key == "--mounts") {
-            (key == "--mounts" ? a.mounts : a.verbose) = true;
+        if (key == "--verbose" || key == "--mounts" || key == "--quick") {
+            (key == "--mounts" ? a.mounts : key == "--quick" ? a.options.quick : a.verbose) = true;
             continue;
         }
         if (i + 1 >= argc) return false;
@@ -141,14 +145,17 @@ int main(int argc, char** argv) {
                 continue;
             }
             if (c.outcome == Outcome::sensitive && !arguments.verbose) continue;
-            std::printf("%llu %s: %.3g tolerances (speeds %.3g) on %s at %.3f s, %d fall-backs; %s\n",
-                        static_cast<unsigned long long>(seed), name(c.outcome), c.worst, c.worst_speed,
-                        c.worst_signal.c_str(), c.worst_time, c.fall_backs, system.traits.c_str());
+            std::printf(
+                "%llu %s: %.3g tolerances (speeds %.3g) on %s at %.3f s (%.9g, not %.9g), %d fall-backs, %d "
+                "coarse, %d lost; "
+                "%s\n",
+                static_cast<unsigned long long>(seed), name(c.outcome), c.worst, c.worst_speed,
+                c.worst_signal.c_str(), c.worst_time, c.worst_value, c.worst_truth, c.fall_backs, c.coarse,
+                c.lost, system.traits.c_str());
             for (const auto& line : c.broken) std::printf("    %s\n", line.c_str());
             if (arguments.verbose) {
                 std::fputs(describe(system.description).c_str(), stdout);
-                std::fputs(timelines(system.description, arguments.options, c.worst_time + 2e-3).c_str(),
-                           stdout);
+                std::fputs(timelines(system, arguments.options, c.worst_time + 2e-3).c_str(), stdout);
             }
             std::fflush(stdout);
         }

@@ -282,6 +282,24 @@ TEST(Warnings, NameForcesThatAnswerSpeedTooFast) {
     EXPECT_EQ(warnings_of(d, 5e-5), Lines{});
 }
 
+// 25 (ω/12.4)² of torque per share of slip near synchronous speed, steeper than the square of the speed elsewhere.
+TEST(Warnings, NameATurbineThatIsTooLightForItsConverter) {
+    Description d;
+    d.masses = {mass("pump", 1), mass("turbine", 1e-4)};
+    TorqueConverter c;
+    c.name = "converter", c.pump = "pump", c.turbine = "turbine";
+    c.k_over_speed_ratio = {{0, 6.6}, {1, 12.4}};
+    c.torque_ratio_over_speed_ratio = {{0, 2.5}, {0.85, 1}};
+    d.converters = {c};
+    EXPECT_EQ(warnings_of(d),
+              Lines{"converter \"converter\": its torque above 78.7 rad/s slows mass \"turbine\" "
+                    "faster than a step of 1 ms resolves"});
+    d.masses[1].inertia = 2e-3;  // parts of 1/256 of a step
+    EXPECT_EQ(warnings_of(d), Lines{});
+    d.maximum_parts = 1;
+    EXPECT_EQ(warnings_of(d).size(), 1u);
+}
+
 TEST(Warnings, NameATyreOnAWheelThatIsTooLight) {
     Description d;
     d.masses = {mass("wheel", 0.0642), mass("body", 3000, Motion::translating)};

@@ -14,6 +14,7 @@ Solver::Energy Solver::power(When when, const Vector& state, const Vector& force
         const double w = omega[system_.source_mass[i]];
         p.input += w * (evaluate(source.waveform, when) - source.quadratic * w * std::abs(w));
     }
+    if (system_.law_input) p.input += system_.law_input(when, state);
     p.dissipated = omega.dot(system_.damper * omega);
     for (int e = 0; e < system_.shafts; ++e) {
         const double rate = system_.shaft_columns.col(e).dot(omega);
@@ -77,7 +78,8 @@ Solver::Rates Solver::fastest_rates() const {
     double fading = d.operatorNorm();
     for (const Friction& pair : system_.frictions)  // rising friction damps as well
         fading = std::max(fading, pair.steepest * (root.asDiagonal() * pair.column).squaredNorm());
-    return {std::sqrt(k.operatorNorm()), fading};
+    // What answers so fast only follows something slower: a quarter of it a step is 1e-5 of the answer off.
+    return {std::sqrt(k.operatorNorm()), std::max(fading, 0.2 * system_.law_rate)};
 }
 
 Result Solver::run(double until, const Options& options) {
@@ -142,10 +144,12 @@ Result Solver::run(double until, const Options& options) {
         if (std::abs(t - static_cast<double>(next_grid) * options.grid) < 1e-12) {
             result.samples.push_back(sample({t, inside}));
             ++next_grid;
+            if (system_.at_grid && system_.at_grid({t, inside}, z)) note(t, "", "law changes");
         }
     }
     time_ = t;
     result.changes = changes;
+    result.shown = system_.shown;
     result.unresolved = unresolved;
     return result;
 }

@@ -59,8 +59,10 @@ void Solver::free_torque(When when, const Vector& state, const Mode& trial, Vect
     }
     for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
         const double s = sign_of(trial.friction[f]);
-        if (s == 0) continue;
         const auto& friction = system_.frictions[f];
+        if (trial.friction[f] == Hold::free && friction.open)
+            out -= friction.column * friction.open(friction.column.dot(state.head(system_.masses)));
+        if (s == 0) continue;
         const double slip = friction.column.dot(state.head(system_.masses));
         out -= friction.column * (s * friction.slides(when, state, slip, s));
     }
@@ -74,10 +76,10 @@ void Solver::free_torque(When when, const Vector& state, const Mode& trial, Vect
 void Solver::solve(When when, const Vector& state, const Mode& trial, Torques& out) {
     const Response& response = responses_.of(trial);
     free_torque(when, state, trial, out.free);
-    out.acceleration = response.acceleration * out.free;
-    out.mesh = response.mesh_torque * out.free;
-    out.loss = response.loss_torque * out.free;
-    out.friction = response.friction_torque * out.free;
+    out.acceleration.noalias() = response.acceleration * out.free;
+    out.mesh.noalias() = response.mesh_torque * out.free;
+    out.loss.noalias() = response.loss_torque * out.free;
+    out.friction.noalias() = response.friction_torque * out.free;
     if (response.friction_freedom.cols() > 0) share(when, state, trial, response, out);
 }
 
@@ -439,6 +441,9 @@ Sample Solver::sample(When when) {
     bool resting = false;
     for (std::size_t f = 0; f < system_.frictions.size(); ++f) {
         const double sign = sign_of(mode.friction[f]);
+        if (mode.friction[f] == Hold::free && system_.frictions[f].open)
+            s.friction_torque[static_cast<Eigen::Index>(f)] =
+                system_.frictions[f].open(system_.frictions[f].column.dot(z.head(system_.masses)));
         if (sign != 0) {
             const double slip = system_.frictions[f].column.dot(z.head(system_.masses));
             s.friction_torque[static_cast<Eigen::Index>(f)] =
@@ -453,6 +458,9 @@ Sample Solver::sample(When when) {
         if (system_.meshes[m].lossy())
             s.loss_torque[static_cast<Eigen::Index>(m)] +=
                 sign_of(mode.mesh[m]) * system_.meshes[m].offset(mode.x[m]);
+    s.shown.resize(static_cast<Eigen::Index>(system_.shown.size()));
+    for (std::size_t i = 0; i < system_.shown.size(); ++i)
+        s.shown[static_cast<Eigen::Index>(i)] = system_.shown[i].value(when, z);
     s.input = energy_.input;
     s.dissipated = energy_.dissipated;
     s.stored = stored_energy();

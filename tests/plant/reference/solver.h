@@ -27,6 +27,7 @@ struct Sample {
     double time = 0;
     Vector z;
     Vector friction_torque, mesh_torque, loss_torque;
+    Vector shown;  // System::shown
     Mode mode;
     bool unique = true;                            // the torque split is
     double input = 0, dissipated = 0, stored = 0;  // [J], the first two since the start
@@ -35,9 +36,10 @@ struct Sample {
 struct Result {
     std::vector<Sample> samples;  // samples[i].time = i·grid
     std::vector<Change> changes;
-    double fastest_rate = 0;  // [1/s] the step was chosen for
-    int unresolved = 0;       // instants at which no consistent combination was found
-    bool gave_up = false;     // event limit or non-finite state
+    std::vector<System::Shown> shown;  // what Sample::shown holds
+    double fastest_rate = 0;           // [1/s] the step was chosen for
+    int unresolved = 0;                // instants at which no consistent combination was found
+    bool gave_up = false;              // event limit or non-finite state
 };
 
 class Solver {

@@ -43,6 +43,8 @@ struct Friction {
     std::function<double(When, const Vector& z)> holding;
     // A freewheel has these capacities in one sense, ±1, and in the other its drag in place of both.
     double sense = 0, drag = 0;
+    // What passes over the slip while nothing presses the pair, if anything does.
+    std::function<double(double slip)> open;
 
     bool is_free_side(double sign) const { return sense * sign < 0; }
     double slides(When when, const Vector& z, double slip, double sign) const {
@@ -128,6 +130,19 @@ struct System {
     std::vector<int> source_mass;
     // Adds forces on the masses and fills the rates of the extra states (all of z may be read).
     std::function<void(When, const Vector& z, Vector& force, Eigen::Ref<Vector> extra_rate)> law;
+    std::function<double(When, const Vector& z)> law_input;  // power that they bring in from outside [W]
+    double law_rate = 0;  // [1/s] about no faster than this do they answer a motion
+    // What is decided at whole milliseconds only: may change extra states, returns whether it did.
+    std::function<bool(When, Vector& z)> at_grid;
+    // What else is shown, and in which unit it is to be compared.
+    enum class Unit { radian_per_second, radian, newton_metre, metre_per_second, newton, slip, joule, count };
+    struct Shown {
+        std::string name;
+        Unit unit;
+        bool smooth;
+        std::function<double(When, const Vector& z)> value;
+    };
+    std::vector<Shown> shown;
     std::vector<double> breaks;  // times at which some law has a jump or a kink, sorted
     Vector start;
 
