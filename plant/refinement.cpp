@@ -201,9 +201,18 @@ namespace {
 class FirstKnot {
   public:
     explicit FirstKnot(const Work& w)
-        : begin(w.scratch.begin()), half(w.scratch.half), end(w.scratch.end()) {}
-    void consider(double g0, double gm, double g1) {
+        : begin(w.scratch.begin()),
+          half(w.scratch.half),
+          end(w.scratch.end()),
+          no_half(w.model.tree != nullptr) {}
+    template <typename Quantity>
+    void consider(const Quantity& zero) {
+        consider(zero(begin), zero(end), [&] { return zero(half); });
+    }
+    template <typename HalfWay>
+    void consider(double g0, double g1, const HalfWay& half_way) {
         if (!(g0 * g1 < 0)) return;
+        const double gm = no_half ? 0.5 * (g0 + g1) : half_way();
         // On the parabola through the three, from the straight line.
         const double a = 2 * (g0 - 2 * gm + g1), b = 4 * gm - 3 * g0 - g1;
         double theta = g0 / (g0 - g1);
@@ -214,13 +223,8 @@ class FirstKnot {
         constexpr double edge = 1e-3;  // nearer to an end of the part than this is there
         if (theta > edge && theta < 1 - edge) first = std::min(first, theta);
     }
-    template <typename Quantity>
-    void consider(const Work& w, const Quantity& zero) {
-        const double g0 = zero(begin), g1 = zero(end);
-        // The engine for long chains has no stage half way.
-        consider(g0, w.model.tree ? 0.5 * (g0 + g1) : zero(half), g1);
-    }
     const Sample &begin, &half, &end;
+    const bool no_half;  // the engine for long chains has no stage there
     double first = 1;
 };
 
@@ -230,7 +234,7 @@ void knots_of_friction(const Work& w, FirstKnot& knots) {
         for (const auto& [knot, factor] :
              *w.model.pair_laws[static_cast<std::size_t>(k)].friction.factor_over_slip) {
             const double at = knot;
-            knots.consider(w, [=](const Sample& s) { return std::fabs(s.slip[k]) - at; });
+            knots.consider([=](const Sample& s) { return std::fabs(s.slip[k]) - at; });
         }
     }
 }
@@ -238,7 +242,7 @@ void knots_of_friction(const Work& w, FirstKnot& knots) {
 void knots_of_converters(const Work& w, FirstKnot& knots) {
     for (const ConverterLaw& law : w.model.converters) {
         for (const ConverterKnot& knot : law.knots) {
-            knots.consider(w, [&](const Sample& s) {
+            knots.consider([&](const Sample& s) {
                 return knot.pump * s.slip[law.pump_force] + knot.turbine * s.slip[law.turbine_force];
             });
         }
@@ -257,19 +261,18 @@ void knots_of_engines(const Work& w, FirstKnot& knots) {
         const auto demand = [&](const Sample& s) {
             return engine_demand(engine, set, -s.slip[law.force], s.engine_full_load[e], s.auxiliary[boost]);
         };
-        knots.consider(w, [&](const Sample& s) {
-            const EngineDemand d = demand(s);
-            return d.governor - std::min(d.available, set.most);
-        });
-        knots.consider(w, [&](const Sample& s) {
-            const EngineDemand d = demand(s);
-            return d.governor + d.friction;
-        });
-        const EngineDemand at_begin = demand(knots.begin);
+        const EngineDemand at_begin = demand(knots.begin), at_end = demand(knots.end);
+        const auto meets = [&](const auto& limit) {
+            knots.consider(limit(at_begin), limit(at_end), [&] { return limit(demand(knots.half)); });
+        };
+        meets([&](const EngineDemand& d) { return d.governor - std::min(d.available, set.most); });
+        meets([&](const EngineDemand& d) { return d.governor + d.friction; });
         if (at_begin.governor < at_begin.available) continue;
-        knots.consider(w, [&](const Sample& s) { return demand(s).available - set.most; });
+        meets([&](const EngineDemand& d) { return d.available - set.most; });
+        const auto speed_of = [&](const Sample& s) { return -s.slip[law.force]; };
+        const double first = speed_of(knots.begin), last = speed_of(knots.end);
         const auto bend = [&](double speed) {
-            knots.consider(w, [&](const Sample& s) { return -s.slip[law.force] - speed; });
+            knots.consider(first - speed, last - speed, [&] { return speed_of(knots.half) - speed; });
         };
         for (const auto& [speed, torque] : engine.full_load) bend(speed);
         bend(engine.fade_from);
