@@ -197,22 +197,30 @@ bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
 
 namespace {
 
-// The first of the knots that the part comes upon. Of each: what is zero there, at begin, half way and end.
+// The first of the knots that the part comes upon. Of each: what is zero there, at begin, half way and end, and of what size
+// its terms are: a converter that stands stalled is at the knot of no speed all the time, by rounding on either side.
 class FirstKnot {
   public:
-    explicit FirstKnot(const Work& w)
-        : begin(w.scratch.begin()),
-          half(w.scratch.half),
-          end(w.scratch.end()),
-          no_half(w.model.tree != nullptr) {}
+    explicit FirstKnot(const Work& work) : w(work) {}
     template <typename Quantity>
-    void consider(const Quantity& zero) {
-        consider(zero(begin), zero(end), [&] { return zero(half); });
-    }
-    template <typename HalfWay>
-    void consider(double g0, double g1, const HalfWay& half_way) {
+    void of_speeds(double g0, double g1, const Quantity& zero) {
         if (!(g0 * g1 < 0)) return;
-        const double gm = no_half ? 0.5 * (g0 + g1) : half_way();
+        consider(g0, g1, w.model.kernel.loops.largest(begin.z, w.model.masses), zero);
+    }
+    template <typename Quantity>
+    void of_torques(double g0, double g1, double size, const Quantity& zero) {
+        if (g0 * g1 < 0) consider(g0, g1, size, zero);
+    }
+    const Work& w;
+    const Sample &begin = w.scratch.begin(), &half = w.scratch.half, &end = w.scratch.end();
+    double first = 1;
+
+  private:
+    template <typename Quantity>
+    void consider(double g0, double g1, double size, const Quantity& zero) {
+        if (std::max(std::fabs(g0), std::fabs(g1)) <= rounding * size) return;
+        // The engine for long chains has no stage half way.
+        const double gm = w.model.tree ? 0.5 * (g0 + g1) : zero(half);
         // On the parabola through the three, from the straight line.
         const double a = 2 * (g0 - 2 * gm + g1), b = 4 * gm - 3 * g0 - g1;
         double theta = g0 / (g0 - g1);
@@ -223,28 +231,30 @@ class FirstKnot {
         constexpr double edge = 1e-3;  // nearer to an end of the part than this is there
         if (theta > edge && theta < 1 - edge) first = std::min(first, theta);
     }
-    const Sample &begin, &half, &end;
-    const bool no_half;  // the engine for long chains has no stage there
-    double first = 1;
 };
 
 void knots_of_friction(const Work& w, FirstKnot& knots) {
     for (const int k : w.model.tabled_pairs) {
         if (!slips(w.contact[k])) continue;
+        const auto slip = [k](const Sample& s) { return std::fabs(s.slip[k]); };
+        const double from = slip(knots.begin), to = slip(knots.end);
         for (const auto& [knot, factor] :
              *w.model.pair_laws[static_cast<std::size_t>(k)].friction.factor_over_slip) {
             const double at = knot;
-            knots.consider([=](const Sample& s) { return std::fabs(s.slip[k]) - at; });
+            knots.of_speeds(from - at, to - at, [=](const Sample& s) { return slip(s) - at; });
         }
     }
 }
 
 void knots_of_converters(const Work& w, FirstKnot& knots) {
     for (const ConverterLaw& law : w.model.converters) {
+        const auto pump = [&](const Sample& s) { return s.slip[law.pump_force]; };
+        const auto turbine = [&](const Sample& s) { return s.slip[law.turbine_force]; };
+        const double p0 = pump(knots.begin), p1 = pump(knots.end), t0 = turbine(knots.begin),
+                     t1 = turbine(knots.end);
         for (const ConverterKnot& knot : law.knots) {
-            knots.consider([&](const Sample& s) {
-                return knot.pump * s.slip[law.pump_force] + knot.turbine * s.slip[law.turbine_force];
-            });
+            knots.of_speeds(knot.pump * p0 + knot.turbine * t0, knot.pump * p1 + knot.turbine * t1,
+                            [&](const Sample& s) { return knot.pump * pump(s) + knot.turbine * turbine(s); });
         }
     }
 }
@@ -263,16 +273,18 @@ void knots_of_engines(const Work& w, FirstKnot& knots) {
         };
         const EngineDemand at_begin = demand(knots.begin), at_end = demand(knots.end);
         const auto meets = [&](const auto& limit) {
-            knots.consider(limit(at_begin), limit(at_end), [&] { return limit(demand(knots.half)); });
+            knots.of_torques(limit(at_begin), limit(at_end), law.peak,
+                             [&](const Sample& s) { return limit(demand(s)); });
         };
         meets([&](const EngineDemand& d) { return d.governor - std::min(d.available, set.most); });
         meets([&](const EngineDemand& d) { return d.governor + d.friction; });
-        if (at_begin.governor < at_begin.available) continue;
+        if (at_begin.governor < std::min(at_begin.available, set.most)) continue;
         meets([&](const EngineDemand& d) { return d.available - set.most; });
+        if (at_begin.available > set.most) continue;
         const auto speed_of = [&](const Sample& s) { return -s.slip[law.force]; };
-        const double first = speed_of(knots.begin), last = speed_of(knots.end);
+        const double from = speed_of(knots.begin), to = speed_of(knots.end);
         const auto bend = [&](double speed) {
-            knots.consider(first - speed, last - speed, [&] { return speed_of(knots.half) - speed; });
+            knots.of_speeds(from - speed, to - speed, [&](const Sample& s) { return speed_of(s) - speed; });
         };
         for (const auto& [speed, torque] : engine.full_load) bend(speed);
         bend(engine.fade_from);

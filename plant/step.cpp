@@ -78,6 +78,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     double length = 1;             // of a part, at most
     int leans = m.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
     int dips = m.maximum_events;   // margins looked at where they are least
+    int knots = m.maximum_events;  // of laws, met
     const bool divides = localise && m.maximum_parts > 1;
     const double halvable = (2 - 1e-9) / m.maximum_parts;  // a part of this length
     for (double done = 0; done < 1;) {
@@ -94,10 +95,11 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
             until = part_end(done, split, length);
             integrate(w, *mode, until);
         }
-        if (localise && dips > 0) {
-            const double theta = std::min(first_dip(w, *mode), first_knot(w));
+        if (localise) {
+            const double dip = dips > 0 ? first_dip(w, *mode) : 1, knot = knots > 0 ? first_knot(w) : 1;
+            const double theta = std::min(dip, knot);
             if (theta < 1) {
-                --dips;
+                --(dip < knot ? dips : knots);
                 until = done + theta * (until - done);
                 integrate(w, *mode, until);
             }

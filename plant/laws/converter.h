@@ -20,6 +20,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "plant/description.h"
@@ -69,14 +70,43 @@ inline std::vector<ConverterKnot> converter_knots(const TorqueConverter& p) {
     return knots;
 }
 
-// How steeply the torque answers the speed of either side, at most: by 2 c ω. Near synchronous speed g makes it (ω/K)² over
-// 0.02 ω, elsewhere it grows with the square of the speed.
-inline double steepest_coefficient(const TorqueConverter& p) noexcept {
-    double least = p.k_over_speed_ratio.front().second, most = 1;
-    for (const auto& [ratio, k] : p.k_over_speed_ratio) least = std::fmin(least, k);
-    for (const auto& [ratio, torque] : p.torque_ratio_over_speed_ratio) most = std::fmax(most, torque);
-    const double synchronous = interpolate(p.k_over_speed_ratio, 1);
-    return std::fmax(most / (least * least), 0.5 / converter_fade / (synchronous * synchronous));
+// How steeply either torque answers either speed, at most: by 2 c ω, with ω the faster one. With q = g/K², driving,
+//
+//     ∂T_p/∂ω_p = ω (2q − ν q'),  ∂T_p/∂ω_t = ω q',  and the same with R q for T_t,
+//
+// of which the slope is largest where g falls to zero and where K runs away before synchronous speed. Between the knots of
+// the tables it is looked for at nine places, both ends among these.
+inline double steepest_coefficient(const TorqueConverter& p) {
+    std::vector<double> knots{0, 1 - converter_fade, 1};
+    for (const auto& [ratio, k] : p.k_over_speed_ratio) knots.push_back(ratio);
+    for (const auto& [ratio, torque] : p.torque_ratio_over_speed_ratio) knots.push_back(ratio);
+    std::sort(knots.begin(), knots.end());
+    const double at_rest = interpolate(p.k_over_speed_ratio, 0),
+                 multiplied = interpolate(p.torque_ratio_over_speed_ratio, 0);
+    double most = (1 + multiplied) / (at_rest * at_rest);  // against one another
+    for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
+        const double from = knots[i], length = knots[i + 1] - from;
+        if (from < 0 || length <= 0 || knots[i + 1] > 1) continue;
+        const auto line = [&](const Table& table) {
+            const double begin = interpolate(table, from), end = interpolate(table, from + length);
+            return std::pair{begin, (end - begin) / length};
+        };
+        const auto [k0, k_slope] = line(p.k_over_speed_ratio);
+        const auto [r0, r_slope] = line(p.torque_ratio_over_speed_ratio);
+        const bool fades = from + 0.5 * length > 1 - converter_fade;
+        constexpr int parts = 8;
+        for (int n = 0; n <= parts; ++n) {
+            const double way = n * length / parts, ratio = from + way;
+            const double k = k0 + k_slope * way, r = r0 + r_slope * way;
+            const double g = fades ? (1 - ratio) / converter_fade : 1,
+                         g_slope = fades ? -1 / converter_fade : 0;
+            const double q = g / (k * k), q_slope = (g_slope - 2 * g * k_slope / k) / (k * k);
+            for (const auto& [size, slope] :
+                 {std::pair{q, q_slope}, std::pair{r * q, r_slope * q + r * q_slope}})
+                most = std::fmax(most, std::fmax(std::fabs(2 * size - ratio * slope), std::fabs(slope)));
+        }
+    }
+    return 0.5 * most;
 }
 
 }  // namespace shiftrig::plant

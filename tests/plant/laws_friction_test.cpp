@@ -1,7 +1,9 @@
 // Friction, oil, tyre, plough, road and converter laws against their equations and the figures of the reference tractor.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "plant/laws/converter.h"
 #include "plant/laws/friction.h"
@@ -205,6 +207,38 @@ TEST(Converter, NeverMakesEnergy) {
             const ConverterTorques torque = converter_torques(c, p, t);
             EXPECT_GE(torque.pump * p - torque.turbine * t, -1e-9) << p << " " << t;
         }
+    }
+}
+
+// The largest of all four derivatives over the faster speed, by differences, all around the circle of the two speeds.
+double steepest_answer(const TorqueConverter& c) {
+    double most = 0;
+    for (int n = 0; n < 200000; ++n) {
+        const double angle = 2 * M_PI * n / 200000, p = 100 * std::cos(angle), t = 100 * std::sin(angle),
+                     d = 1e-5;
+        const ConverterTorques here = converter_torques(c, p, t), by_pump = converter_torques(c, p + d, t),
+                               by_turbine = converter_torques(c, p, t + d);
+        for (const auto& there : {by_pump, by_turbine}) {
+            const double change =
+                std::max(std::fabs(there.pump - here.pump), std::fabs(there.turbine - here.turbine));
+            most = std::max(most, change / d / std::max(std::fabs(p), std::fabs(t)));
+        }
+    }
+    return most;
+}
+
+TEST(Converter, AnswersNoSpeedMoreSteeplyThanItsCoefficientSays) {
+    TorqueConverter c = reference_converter();
+    const auto runs_off = [&](Table k) {
+        c.k_over_speed_ratio = std::move(k);
+        return c;
+    };
+    for (const TorqueConverter& one :
+         {reference_converter(), runs_off({{0, 6.6}, {0.8, 7}, {0.95, 8}, {1, 100}}),
+          runs_off({{0, 6.6}, {0.97, 7}, {1, 40}}), runs_off({{0, 6.6}, {0.5, 5}, {1, 12}})}) {
+        const double bound = 2 * steepest_coefficient(one), found = steepest_answer(one);
+        EXPECT_LE(found, bound * (1 + 1e-6));
+        EXPECT_GE(found, 0.9 * bound);
     }
 }
 

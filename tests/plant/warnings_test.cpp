@@ -292,7 +292,7 @@ TEST(Warnings, NameATurbineThatIsTooLightForItsConverter) {
     c.torque_ratio_over_speed_ratio = {{0, 2.5}, {0.85, 1}};
     d.converters = {c};
     EXPECT_EQ(warnings_of(d),
-              Lines{"converter \"converter\": its torque above 78.7 rad/s slows mass \"turbine\" "
+              Lines{"converter \"converter\": its torque above 74.4 rad/s slows mass \"turbine\" "
                     "faster than a step of 1 ms resolves"});
     d.masses[1].inertia = 2e-3;  // parts of 1/256 of a step
     EXPECT_EQ(warnings_of(d), Lines{});
