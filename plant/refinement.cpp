@@ -31,16 +31,17 @@ bool exceeds(const Work& w, double torque, double share) {
 
 // The last stage stands on an extrapolation: what it took the forces to be, `late`, and what they are. A light body makes much
 // of a little torque, so speeds matter as well: at the end they differ by at most `reach` times the largest of those
-// differences, and by change() in fact.
+// differences, and by change() in fact. `other`: a torque that is amiss besides.
 template <typename Change>
-bool takes_forces_amiss(const Work& w, const double* late, double reach, const Change& change) {
+bool takes_forces_amiss(const Work& w, const double* late, double reach, const Change& change,
+                        double other = 0) {
     const ModelData& m = w.model;
     const DeviceLoops& loops = m.kernel.loops;
     const Sample& end = w.scratch.end();
     const double wrong = loops.largest_difference(end.f, late, m.forces);
-    if (wrong == 0) return false;
+    if (wrong == 0 && other == 0) return false;
     const double much = speed_tolerance * loops.largest(end.z, m.masses);
-    return (reach * wrong > much && change() > much) || exceeds(w, wrong, force_tolerance);
+    return (reach * wrong > much && change() > much) || exceeds(w, std::max(wrong, other), force_tolerance);
 }
 
 // Slow states (slip of tyres, torque and boost of engines) stand on the same stage, by a sixth of the part: the torque that
@@ -149,11 +150,8 @@ bool is_dense_coarse(Work& w, const Mode& mode) {
         }
         return moved;
     };
-    const auto takes_slow_states_amiss = [&] {
-        const double torque = m.auxiliary > 0 ? slow_states_amiss(w) : 0;
-        return torque > 0 && exceeds(w, torque, force_tolerance);
-    };
-    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change) || takes_slow_states_amiss() ||
+    const double slow = m.auxiliary > 0 ? slow_states_amiss(w) : 0;
+    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change, slow) ||
            friction_outruns_stages(w, [&](int k) { return dense_answer(w, mode, k); }) || hides_swing(w);
 }
 
@@ -286,7 +284,11 @@ void knots_of_engines(const Work& w, FirstKnot& knots) {
         const auto bend = [&](double speed) {
             knots.of_speeds(from - speed, to - speed, [&](const Sample& s) { return speed_of(s) - speed; });
         };
-        for (const auto& [speed, torque] : engine.full_load) bend(speed);
+        bool bends = false;  // mostly not
+        for (const auto& [speed, torque] : engine.full_load) bends |= (from - speed) * (to - speed) < 0;
+        if (bends) {
+            for (const auto& [speed, torque] : engine.full_load) bend(speed);
+        }
         bend(engine.fade_from);
         bend(engine.fade_to);
     }
@@ -294,7 +296,7 @@ void knots_of_engines(const Work& w, FirstKnot& knots) {
 
 }  // namespace
 
-double first_knot(const Work& w) SHIFTRIG_REALTIME {
+double look_for_knots(const Work& w) SHIFTRIG_REALTIME {
     FirstKnot knots(w);
     knots_of_friction(w, knots);
     knots_of_converters(w, knots);

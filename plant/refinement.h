@@ -12,6 +12,10 @@ bool is_coarse(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
 
 // Where between begin and end a law first comes upon a knot (of a friction table, of a converter, of an engine's curve or its
 // governor's limits), beyond which the part's few samples would see another slope. 1: nowhere.
-double first_knot(const Work& work) SHIFTRIG_REALTIME;
+double look_for_knots(const Work& work) SHIFTRIG_REALTIME;
+inline double first_knot(const Work& work) SHIFTRIG_REALTIME {
+    const ModelData& m = work.model;
+    return m.tabled_pairs.empty() && m.converters.empty() && m.engines.empty() ? 1 : look_for_knots(work);
+}
 
 }  // namespace shiftrig::plant::detail
