@@ -62,6 +62,7 @@ inline std::vector<ConverterKnot> converter_knots(const TorqueConverter& p) {
     for (const auto& [ratio, k] : p.k_over_speed_ratio) capacity.push_back(ratio);
     for (const auto& [ratio, torque] : p.torque_ratio_over_speed_ratio) multiplied.push_back(ratio);
     std::vector<ConverterKnot> knots;
+    knots.reserve(2 * capacity.size() + multiplied.size());
     for (const double ratio : capacity) knots.push_back({1, -ratio});  // overrun
     multiplied.insert(multiplied.end(), capacity.begin(), capacity.end());
     std::sort(multiplied.begin(), multiplied.end());
