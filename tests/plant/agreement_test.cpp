@@ -135,17 +135,21 @@ TEST(KinematicMethod, AgreesWithTheMethodOfInternalTorques) {
     }
 }
 
+void expect_agreement(const RandomSystem& system, std::uint64_t seed, const Comparison& c) {
+    EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
+    EXPECT_TRUE(c.outcome == Outcome::agrees || c.outcome == Outcome::sensitive)
+        << "seed " << seed << " " << name(c.outcome) << ": " << c.worst << " tolerances on " << c.worst_signal
+        << " at " << c.worst_time << " s\n"
+        << describe(system.description);
+}
+
 TEST(RandomSystems, AFixedSubsetAgreesWithTheReferenceSolver) {
     const ComparisonOptions options;
     int agreeing = 0;
     for (std::uint64_t seed = 1; seed <= 60; ++seed) {
         const RandomSystem system = random_system(seed, options.seconds);
         const Comparison c = compare(system, seed, options);
-        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
-        EXPECT_TRUE(c.outcome == Outcome::agrees || c.outcome == Outcome::sensitive)
-            << "seed " << seed << " " << name(c.outcome) << ": " << c.worst << " tolerances on "
-            << c.worst_signal << " at " << c.worst_time << " s\n"
-            << describe(system.description);
+        expect_agreement(system, seed, c);
         agreeing += c.outcome == Outcome::agrees;
     }
     EXPECT_GE(agreeing, 59);
@@ -159,11 +163,7 @@ TEST(RandomSystems, WithFreewheelsAgreeWithTheReferenceSolver) {
         if (system.description.freewheels.empty()) continue;
         freewheels += static_cast<int>(system.description.freewheels.size());
         const Comparison c = compare(system, seed, options);
-        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
-        EXPECT_TRUE(c.outcome == Outcome::agrees || c.outcome == Outcome::sensitive)
-            << "seed " << seed << " " << name(c.outcome) << ": " << c.worst << " tolerances on "
-            << c.worst_signal << " at " << c.worst_time << " s\n"
-            << describe(system.description);
+        expect_agreement(system, seed, c);
         ++compared;
         agreeing += c.outcome == Outcome::agrees;
     }
@@ -303,11 +303,7 @@ TEST(RandomSystems, WithBacklashesAgreeWithTheReferenceSolver) {
         if (system.description.backlashes.empty()) continue;
         backlashes += static_cast<int>(system.description.backlashes.size());
         const Comparison c = compare(system, seed, options);
-        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
-        EXPECT_TRUE(c.outcome == Outcome::agrees || c.outcome == Outcome::sensitive)
-            << "seed " << seed << " " << name(c.outcome) << ": " << c.worst << " tolerances on "
-            << c.worst_signal << " at " << c.worst_time << " s\n"
-            << describe(system.description);
+        expect_agreement(system, seed, c);
         ++compared;
         agreeing += c.outcome == Outcome::agrees;
     }
@@ -343,11 +339,7 @@ TEST(RandomVehicles, AFixedSubsetAgreesWithTheReferenceSolver) {
     for (std::uint64_t seed = 1; seed <= 30; ++seed) {
         const RandomSystem system = random_vehicle(seed, options.seconds);
         const Comparison c = compare(system, seed, options);
-        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
-        EXPECT_TRUE(c.outcome == Outcome::agrees || c.outcome == Outcome::sensitive)
-            << "seed " << seed << " " << name(c.outcome) << ": " << c.worst << " tolerances on "
-            << c.worst_signal << " at " << c.worst_time << " s\n"
-            << describe(system.description);
+        expect_agreement(system, seed, c);
         EXPECT_EQ(c.fall_backs, 0) << "seed " << seed;
         agreeing += c.outcome == Outcome::agrees;
     }
@@ -403,11 +395,7 @@ TEST(RandomVehicles, WithWetClutchesBehindValvesAgreeWithTheReference) {
     for (std::uint64_t seed = 1; seed <= 15; ++seed) {
         const RandomSystem system = random_vehicle_with_wet_clutches(seed, options.seconds);
         const Comparison c = compare(system, seed, options);
-        EXPECT_TRUE(c.broken.empty()) << "seed " << seed << ": " << c.broken.front();
-        EXPECT_TRUE(c.outcome == Outcome::agrees || c.outcome == Outcome::sensitive)
-            << "seed " << seed << " " << name(c.outcome) << ": " << c.worst << " tolerances on "
-            << c.worst_signal << " at " << c.worst_time << " s\n"
-            << describe(system.description);
+        expect_agreement(system, seed, c);
         agreeing += c.outcome == Outcome::agrees;
     }
     EXPECT_GE(agreeing, 14);

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "tests/plant/dice.h"
+#include "tests/plant/random_builder.h"
 #include "tests/plant/random_forests.h"
 
 namespace shiftrig {
@@ -14,9 +14,9 @@ namespace {
 
 using namespace plant;
 
-class Builder {
+class Builder : RandomBuilder {
   public:
-    Builder(std::uint64_t seed, double seconds) : dice_(seed), seconds_(seconds) {
+    Builder(std::uint64_t seed, double seconds) : RandomBuilder(seed, seconds) {
         system_.description.name = "random " + std::to_string(seed);
     }
 
@@ -30,21 +30,10 @@ class Builder {
         drive();
         set_in_motion();
         system_.momentum_is_conserved = !grounded_ && d().gears.empty() && d().planetaries.empty();
-        system_.traits = "n=" + std::to_string(d().masses.size()) + system_.traits;
-        return std::move(system_);
+        return finish();
     }
 
   private:
-    Description& d() { return system_.description; }
-    std::string name(const char* kind) { return kind + std::to_string(++count_); }
-    void trait(const char* word) { system_.traits += std::string(" ") + word; }
-    double instant() { return 1e-3 * dice_.integer(5, static_cast<int>(seconds_ * 900)); }
-    double inertia(const std::string& mass_name) {
-        for (const auto& m : d().masses)
-            if (m.name == mass_name) return m.inertia;
-        return 0;
-    }
-
     std::string add_mass() {
         double j = dice_.logarithmic(0.03, 3);
         if (dice_.chance(0.08)) {
@@ -332,13 +321,10 @@ class Builder {
             d().masses[static_cast<std::size_t>(i)].initial_speed = motion[i];
     }
 
-    Dice dice_;
-    double seconds_;
-    RandomSystem system_;
     double torque_level_ = 0;
     bool many_clutch_paths_ = false, grounded_ = false;
     std::vector<double> instants_;
-    int count_ = 0, lossy_ = 0;
+    int lossy_ = 0;
 };
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/plant/dice.h"
+#include "tests/plant/random_builder.h"
 
 namespace shiftrig {
 namespace {
@@ -18,9 +18,9 @@ enum class Manoeuvre { start, drive, coast, brake, roll_back, stand, spin, lug }
 constexpr const char* manoeuvres[] = {"start",     "drive", "coast", "brake",
                                       "roll-back", "stand", "spin",  "lug"};
 
-class Builder {
+class Builder : RandomBuilder {
   public:
-    Builder(std::uint64_t seed, double seconds) : dice_(seed + 0x7e41c1e), seconds_(seconds) {
+    Builder(std::uint64_t seed, double seconds) : RandomBuilder(seed + 0x7e41c1e, seconds) {
         d().name = "vehicle " + std::to_string(seed);
     }
 
@@ -45,26 +45,16 @@ class Builder {
         auto& inputs = system_.inputs;
         std::stable_sort(inputs.begin(), inputs.end(),
                          [](const auto& a, const auto& b) { return a.time < b.time; });
-        system_.traits = "n=" + std::to_string(d().masses.size()) + system_.traits;
-        return std::move(system_);
+        return finish();
     }
 
   private:
-    Description& d() { return system_.description; }
-    std::string name(const char* kind) { return kind + std::to_string(++count_); }
-    void trait(const char* word) { system_.traits += std::string(" ") + word; }
-    double instant() { return 1e-3 * dice_.integer(5, static_cast<int>(seconds_ * 900)); }
     void tell(double time, const std::string& input, double value) {
         system_.inputs.push_back({time, input, value});
     }
     void later(const std::string& input, double low, double high) {
         const double time = instant();
         tell(time, input, dice_.uniform(low, high));
-    }
-    double inertia(const std::string& mass) {
-        for (const auto& m : d().masses)
-            if (m.name == mass) return m.inertia;
-        return 0;
     }
 
     // ---- the chain of masses from the engine on: `here_` is its end, turning `ratio_` times slower than the engine in the
@@ -604,15 +594,12 @@ class Builder {
                 std::abs(speeds[i]) < 1e-12 ? 0 : speeds[i];
     }
 
-    Dice dice_;
-    double seconds_;
-    RandomSystem system_;
     Manoeuvre manoeuvre_{};
     double peak_ = 0, rated_ = 0, body_mass_ = 0, radius_ = 0;
     double ratio_ = 1;
     std::vector<double> turns_;  // ratio_ where each rotating mass stands
     std::string here_, crank_, loose_;
-    int count_ = 0, lossy_ = 0, wheels_ = 0, before_split_ = 0;
+    int lossy_ = 0, wheels_ = 0, before_split_ = 0;
     bool split_ = false, pedal_ = false;
 };
 
