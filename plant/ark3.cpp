@@ -135,11 +135,11 @@ void complete_swing(const ModelData& m, const TreeMode& t, TreeWork& v, double h
     const StageSums sums = stage_sums(swing_impulse, embedded_error, stages, net, v, h);
     const Swing swing = v.swing_seen = kernel.swing_error(t.paths, sums, v.way);
     if (!(swing.error > ark3_swing_tolerance * h * std::max(swing.fastest, at_rest))) return;
-    kernel.combine(t.paths, sums, v.momentum, v.way);
-    kernel.give(t.forces, efforts(swing_impulse.effort, stages, v, h), nullptr, v.momentum);
+    const SwingWork work{v.swing[0], v.swing[1], v.swing[2], v.swing[3]};
+    kernel.combine(t.paths, stage.weight, sums, nullptr, work.first, v.way);
+    kernel.give(t.forces, efforts(swing_impulse.effort, stages, v, h), nullptr, work.first);
     constexpr double factor = -excess / embedded / gamma;
-    kernel.correct(t.paths, stage, v.momentum, v.way, factor,
-                   {v.swing[0], v.swing[1], v.swing[2], v.swing[3]}, end.speed, end.twist);
+    kernel.correct(t.paths, stage, v.way, factor, work, end.speed, end.twist);
 }
 
 // Parts of one length share their matrix.
@@ -148,7 +148,7 @@ const StageMatrix& part_matrix(Work& w, const Mode& mode, double weight) {
     StageMatrix& matrix = s.tree.matrix;
     if (s.part_mode != &mode || s.part_modes_built != w.operators.misses || matrix.weight != weight) {
         matrix.weight = weight;
-        factor_stage(*mode.tree, matrix);
+        factor_stage(w.model.tree->kernel.block, *mode.tree, matrix);
         s.part_mode = &mode;
         s.part_modes_built = w.operators.misses;
     }
@@ -176,12 +176,13 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
     Sample& late = s.late;  // of each stage in turn, its f kept
     copy_few(begin.auxiliary_rate, m.auxiliary, v.auxiliary_rate[0]);
     for (int i = 1; i < stages; ++i) {
-        kernel.combine(t.paths, stage_sums(impulses.star[i], implicit_table[i], i, start.net, v, h),
-                       v.momentum, v.way);
-        kernel.give(t.forces, efforts(impulses.star[i].effort, i, v, h), nullptr, v.momentum);
         double* const speed = v.stage_speed[i - 1];
+        kernel.combine(t.paths, matrix.weight,
+                       stage_sums(impulses.star[i], implicit_table[i], i, start.net, v, h), start.twist,
+                       speed, v.way);
+        kernel.give(t.forces, efforts(impulses.star[i].effort, i, v, h), nullptr, speed);
+        kernel.solve(t.paths, matrix, speed);
         v.speed[i] = speed;
-        kernel.solve(t.paths, matrix, v.momentum, {start.twist, v.way}, speed);
 
         const bool last = i == stages - 1;
         const double fraction = last ? end_fraction : from + nodes[i] * length;
@@ -199,8 +200,7 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
 
     // The implicit table ends with b: the last stage needs only what its explicit part lacks.
     GroupState& groups = end.groups;
-    kernel.finish(t.paths, {start.twist, v.way}, matrix.weight, v.speed[stages - 1], groups.speed,
-                  groups.twist);
+    kernel.finish(t.paths, matrix.weight, start.twist, v.way, v.speed[stages - 1], groups.speed, groups.twist);
     kernel.give(t.forces, efforts(lacks.share, stages, v, h), t.inverse_mass, groups.speed);
     v.swing_seen = {};
     if (t.swings) complete_swing(m, t, v, h, matrix, start.net, groups);

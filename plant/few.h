@@ -2,7 +2,9 @@
 // register or two, and their wide reads wait for the narrow writes just before them.
 #pragma once
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -17,6 +19,19 @@ inline double* copy_few(const double* from, int count, double* to) noexcept {
 
 inline void clear_few(double* from, double* end) noexcept {
     while (from < end) *from++ = 0;
+}
+
+// The largest magnitude of value(i), at least 0; of an even and an odd one in turn, since each waits for the one before.
+template <typename Value>
+double largest_of(int count, const Value& value) noexcept {
+    double even = 0, odd = 0;
+    int i = 0;
+    for (; i + 1 < count; i += 2) {
+        even = std::max(even, std::fabs(value(i)));
+        odd = std::max(odd, std::fabs(value(i + 1)));
+    }
+    if (i < count) even = std::max(even, std::fabs(value(i)));
+    return std::max(even, odd);
 }
 
 // The same, bit for bit?

@@ -195,10 +195,7 @@ double torque_residual(Work& w, const Mode& mode, const Sample& s) {
 }
 
 double constraint_violation(const Mode& mode, const double* speeds) {
-    double worst = 0;
-    for (int r = 0; r < mode.row_count; ++r)
-        worst = std::max(worst, std::fabs(slip_fast(mode.row_links[r], speeds)));
-    return worst;
+    return largest_of(mode.row_count, [&](int r) { return slip_fast(mode.row_links[r], speeds); });
 }
 
 }  // namespace

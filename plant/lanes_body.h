@@ -12,6 +12,9 @@ inline Lanes read(const double* p) noexcept {
 inline void write(double* p, const Lanes& v) noexcept {
     __builtin_memcpy(p, &v, sizeof v);
 }
+inline Lanes all(double value) noexcept {
+    return value - Lanes{};
+}
 inline Lanes magnitude(const Lanes& v) noexcept {
     return reinterpret_cast<Lanes>(reinterpret_cast<Marks>(v) & INT64_MAX);
 }

@@ -176,8 +176,9 @@ void find_grounds(const ModelData& model, Mode& mode, TreeMode& tree) SHIFTRIG_R
 // S = Ĉ W Ĉᵀ of the grounded groups.
 void factor_network(const ModelData& model, TreeMode& tree) SHIFTRIG_REALTIME;
 
-// L D Lᵀ of M + hγ D' + (hγ)² K' for the weight hγ of the matrix, which has its memory.
-void factor_stage(const TreeMode& tree, StageMatrix& matrix) SHIFTRIG_REALTIME;
+// L D Lᵀ of M + hγ D' + (hγ)² K' for the weight hγ of the matrix, which has its memory; `block`: of the kernel
+// that will solve with it.
+void factor_stage(int block, const TreeMode& tree, StageMatrix& matrix) SHIFTRIG_REALTIME;
 
 // ---- motion of the groups -----------------------------------------------------------------------------
 

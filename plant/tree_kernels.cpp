@@ -1,3 +1,4 @@
+#define SHIFTRIG_LANES 4
 #define SHIFTRIG_FMA(a, b, c) ((a) * (b) + (c))
 #define SHIFTRIG_BLOCK_FMA(a, b, c) ((a) * (b) + (c))
 #include "plant/tree_kernels_body.h"

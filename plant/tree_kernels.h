@@ -9,8 +9,7 @@
 namespace shiftrig::plant::detail {
 
 // The groups of a mode as the loops see them. Vectors are read and written in whole blocks: up to seven elements behind the last
-// group and one before the first belong to them. Only twists and ways have to be numbers there, behind the last group
-// and of ways before the first.
+// group belong to them, whatever stands there.
 struct TreePaths {
     int groups = 0;
     int count = 0;                   // paths
@@ -51,33 +50,32 @@ struct StageSums {
     const double* net = nullptr;  // M q̇ at the beginning
     double of_net = 0;
 };
-using Combine = void (*)(const TreePaths&, const StageSums&, double* momentum, double* way) SHIFTRIG_REALTIME;
+// And the right-hand side of the stage that follows, momenta − hγ K (twist + differences of the ways), with the weight hγ. No
+// twist: none.
+using Combine = void (*)(const TreePaths&, double weight, const StageSums&, const double* twist, double* right,
+                         double* way) SHIFTRIG_REALTIME;
 
-// Twists ψ + share · (differences of `way`).
-struct Twists {
-    const double *twist = nullptr, *way = nullptr;
-    double share = 1;
-};
-// One implicit stage: q of (M + hγ D + (hγ)² K) q = momentum − hγ K twists, with the weight hγ.
+// One implicit stage: q of (M + hγ D + (hγ)² K) q = the right-hand side, in its place.
 //
 // Along a run x_g = y_g + L x of the one before is worked out for a block of groups at a time: to y of each that of the one,
-// then of the second before it in its block is added with these factors, at last what stands before the block. Blocks
-// are counted from where the sweep begins; what is left of a run goes one by one. Only where runs are long.
-constexpr int tree_block = 4;
+// then of the second, then (blocks of eight) of the fourth before it in its block is added with these factors, at last what
+// stands before the block. Blocks are counted from where the sweep begins; what is left of a run goes one by one. Only
+// where runs are long.
+constexpr int largest_tree_block = 8, smallest_tree_block = 4;
 struct TreeScan {
-    double *by_one = nullptr, *by_two = nullptr, *from_outside = nullptr;
+    double *by_one = nullptr, *by_two = nullptr, *by_four = nullptr, *from_outside = nullptr;
 };
 struct StageMatrix {
     double weight = 0;
     double *inverse = nullptr, *lower = nullptr;  // 1/D, L
     TreeScan towards_leaves, towards_roots;
 };
-using Solve = void (*)(const TreePaths&, const StageMatrix&, const double* momentum, const Twists&,
-                       double* speed) SHIFTRIG_REALTIME;
+using Solve = void (*)(const TreePaths&, const StageMatrix&, double* right) SHIFTRIG_REALTIME;
 
-// Twists at the end of the step, `way` without what the last stage gives to it; a copy of its speeds.
-using FinishStages = void (*)(const TreePaths&, const Twists&, double weight, const double* last_speed,
-                              double* speed, double* twist) SHIFTRIG_REALTIME;
+// Twists at the end of the step, from those at the beginning, ways without what the last stage gives to them, and its speeds, which
+// are copied.
+using FinishStages = void (*)(const TreePaths&, double weight, const double* begin_twist, const double* way,
+                              const double* last_speed, double* speed, double* twist) SHIFTRIG_REALTIME;
 
 // Speeds half way, from Hermite's cubic; Σ loss (δ0² + 4 δm² + δ1²) + drag_loss (q0² + 4 qm² + q1²).
 struct MiddleSums {
@@ -94,13 +92,13 @@ struct Swing {
 // e as the differences of Σ of_way_j q_j, left in `way`; the last speed is that of the end.
 using SwingError = Swing (*)(const TreePaths&, const StageSums&, double* way) SHIFTRIG_REALTIME;
 
-// Adds factor (S² − S) e to speeds and twists, e = (momentum; differences of `way`): S = (1 − hγL)⁻¹ of the linear part L is
-// what a stage solves with. Leaves nothing of `momentum`.
+// Adds factor (S² − S) e to speeds and twists: S = (1 − hγL)⁻¹ of the linear part L is what a stage solves with. Of the momenta
+// and twists e, the latter differences of `way`, work.first has the right-hand side that they give.
 struct SwingWork {
-    double *error, *first, *second, *rate;
+    double *first, *second, *error, *rate;
 };
-using Correct = void (*)(const TreePaths&, const StageMatrix&, double* momentum, const double* way,
-                         double factor, const SwingWork&, double* speed, double* twist) SHIFTRIG_REALTIME;
+using Correct = void (*)(const TreePaths&, const StageMatrix&, const double* way, double factor,
+                         const SwingWork&, double* speed, double* twist) SHIFTRIG_REALTIME;
 
 // What belongs to one or two groups each: the factor is 0 where there is only one.
 struct GroupPairs {
@@ -136,6 +134,7 @@ using Spread = void (*)(const Spreading&, const double* of_group, int count,
                         double* values) SHIFTRIG_REALTIME;
 
 struct TreeKernel {
+    int block = 0;  // what its loops take at a time, smallest_tree_block or largest_tree_block
     ShaftTorques shaft_torques = nullptr;
     Combine combine = nullptr;
     Solve solve = nullptr;

@@ -1,6 +1,7 @@
 // AVX2 with fused multiply-add.
 #if defined(SHIFTRIG_X86_KERNELS)
 #include <immintrin.h>
+#define SHIFTRIG_LANES 4
 #define SHIFTRIG_FMA(a, b, c) __builtin_fma(a, b, c)
 #define SHIFTRIG_BLOCK_FMA(a, b, c) _mm256_fmadd_pd(a, b, c)
 #include "plant/tree_kernels_body.h"

@@ -115,11 +115,11 @@ void find_paths(TreeMode& t) {
     paths.damping = t.damping;
 }
 
-void find_lines(Spreading& s, int count) {
-    for (int i = 0; i + tree_block <= count; i += tree_block) {
+void find_lines(Spreading& s, int count, int block) {
+    for (int i = 0; i + block <= count; i += block) {
         bool in_line = true;
-        for (int j = 1; j < tree_block; ++j) in_line = in_line && s.group[i + j] == s.group[i] + j;
-        s.in_line[i / tree_block] = in_line;
+        for (int j = 1; j < block; ++j) in_line = in_line && s.group[i + j] == s.group[i] + j;
+        s.in_line[i / block] = in_line;
     }
 }
 
@@ -172,8 +172,8 @@ void find_masses(const ModelData& m, const Mode& mode, TreeMode& t) {
         }
         t.exact = t.exact && std::fabs(t.ratio[p]) == 1;
     }
-    find_lines(t.masses, m.masses);
-    find_lines(t.shafts, m.twists);
+    find_lines(t.masses, m.masses, topology.kernel.block);
+    find_lines(t.shafts, m.twists, topology.kernel.block);
     const auto end = [&](int g, int position, double factor) {
         if (!rigid[position]) return;
         t.end_group[t.end_count] = g;
@@ -265,42 +265,43 @@ void build_tree_mode(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
     if (t.ground_count > 0) factor_network(m, t);
     find_swing(m, t);
     t.matrix.weight = ark3_gamma * m.options.step_size;
-    factor_stage(t, t.matrix);
+    factor_stage(m.tree->kernel.block, t, t.matrix);
 }
 
 namespace {
 
 // Of a block whose values each take `link` times the one before: the factors of a scan. `first` is the value that the sweep
 // meets first, the others follow in this direction.
-void scan_block(const double (&link)[tree_block], int first, int direction, TreeScan& scan) {
+void scan_block(const double* link, int block, int first, int direction, TreeScan& scan) {
     double outside = 1;
-    for (int i = 0; i < tree_block; ++i) {
+    for (int i = 0; i < block; ++i) {
         const int g = first + direction * i;
         outside *= link[i];
         scan.by_one[g] = i < 1 ? 0 : link[i];
         scan.by_two[g] = i < 2 ? 0 : link[i] * link[i - 1];
+        scan.by_four[g] = i < 4 ? 0 : link[i] * link[i - 1] * link[i - 2] * link[i - 3];
         scan.from_outside[g] = outside;
     }
 }
 
-void prepare_scans(const TreePaths& t, StageMatrix& m) {
+void prepare_scans(int block, const TreePaths& t, StageMatrix& m) {
     for (int run = 0; run < t.run_count; ++run) {
         const int begin = t.run_begin[run], end = t.run_begin[run + 1];
-        double link[tree_block];
-        for (int g = begin; g + tree_block <= end; g += tree_block) {
-            for (int i = 0; i < tree_block; ++i) link[i] = m.lower[g + i];
-            scan_block(link, g, 1, m.towards_leaves);
+        double link[largest_tree_block];
+        for (int g = begin; g + block <= end; g += block) {
+            for (int i = 0; i < block; ++i) link[i] = m.lower[g + i];
+            scan_block(link, block, g, 1, m.towards_leaves);
         }
-        for (int g = end; g - tree_block >= begin; g -= tree_block) {
-            for (int i = 0; i < tree_block; ++i) link[i] = g - i == end ? 0 : m.lower[g - i];
-            scan_block(link, g - 1, -1, m.towards_roots);
+        for (int g = end; g - block >= begin; g -= block) {
+            for (int i = 0; i < block; ++i) link[i] = g - i == end ? 0 : m.lower[g - i];
+            scan_block(link, block, g - 1, -1, m.towards_roots);
         }
     }
 }
 
 }  // namespace
 
-void factor_stage(const TreeMode& t, StageMatrix& matrix) SHIFTRIG_REALTIME {
+void factor_stage(int block, const TreeMode& t, StageMatrix& matrix) SHIFTRIG_REALTIME {
     const double weight = matrix.weight;
     double *const inverse = matrix.inverse, *const lower = matrix.lower;
     const int groups = t.paths.groups;
@@ -320,7 +321,7 @@ void factor_stage(const TreeMode& t, StageMatrix& matrix) SHIFTRIG_REALTIME {
         }
         inverse[g] = t.grounded[g] ? 0 : 1 / inverse[g];
     }
-    if (t.paths.long_runs) prepare_scans(t.paths, matrix);
+    if (t.paths.long_runs) prepare_scans(block, t.paths, matrix);
 }
 
 }  // namespace shiftrig::plant::detail

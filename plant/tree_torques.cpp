@@ -51,7 +51,6 @@ void read_groups(const TreeMode& t, const double* z, GroupState& s) SHIFTRIG_REA
     const int groups = t.paths.groups;
     for (int g = 0; g < groups; ++g) s.speed[g] = t.speed_factor[g] * z[t.speed_slot[g]];
     for (int g = 0; g < groups; ++g) s.twist[g] = t.twist_factor[g] * z[t.twist_slot[g]];
-    s.twist[groups] = 0;  // read, and of no consequence
 }
 
 void complete_groups(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
@@ -112,16 +111,15 @@ void rigid_torques(const Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME
         solve_network(m, t, load, potential, torque);
         solve_network(m, t, load, potential, torque);
     }
-    double scale = 0, rest = 0;
-    for (int e = 0; e < t.inner_edge_count; ++e) {
+    const double loads = largest_of(t.inner_edge_count, [&](int e) {
         const TreeEdge& edge = t.inner_edge[e];
-        const double moment = load[edge.position] * edge.reciprocal;
-        scale = std::max(scale, std::fabs(load[edge.position]));
+        const double passed = load[edge.position], moment = passed * edge.reciprocal;
         torque[edge.unknown] = moment;
         load[edge.parent] -= edge.up * moment;
-    }
-    for (int i = 0; i < t.spent_count; ++i) rest = std::max(rest, std::fabs(load[t.spent[i]]));
-    for (int k = 0; k < m.torques; ++k) scale = std::max(scale, std::fabs(torque[k]));
+        return passed;
+    });
+    const double rest = largest_of(t.spent_count, [&](int i) { return load[t.spent[i]]; }),
+                 scale = std::max(loads, m.kernel.loops.largest(torque, m.torques));
     s.torque_residual = scale > 0 ? rest / scale : 0;
 }
 
