@@ -12,9 +12,8 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-// Of the largest torque, of the largest speed, of the way that the fastest mass turns.
-constexpr double force_tolerance = 2e-5, swing_tolerance = 2e-5, speed_tolerance = 1e-6,
-                 twist_tolerance = 3e-6;
+// Of the largest torque, of the largest speed.
+constexpr double force_tolerance = 2e-5, swing_tolerance = 2e-5, speed_tolerance = 1e-6;
 constexpr double rounding = 1e-9;  // of the torques in shafts: by so much they differ where nothing swings
 
 // Is this more than so much of the largest torque? That the forces are among these mostly settles it.
@@ -44,10 +43,11 @@ bool takes_forces_amiss(const Work& w, const double* late, double reach, const C
     return (reach * wrong > much && change() > much) || exceeds(w, std::max(wrong, other), force_tolerance);
 }
 
-// Slow states (slip of tyres, torque and boost of engines) stand on the same stage, by a sixth of the part: the torque that
+// Slow states (slip of tyres, torque and boost of engines) stand on the same stage, which weighs so much [s]: the torque that
 // they would be off by. A wheel that swings on its tyre shows in the forces twice a turn not at all.
-double slow_states_amiss(const Work& w) {
+double slow_states_amiss(const Work& w, double weight) {
     const ModelData& m = w.model;
+    if (m.auxiliary == 0) return 0;
     const Sample &late = w.scratch.late, &end = w.scratch.end();
     const auto wrong = [&](std::size_t i) {
         return std::fabs(end.auxiliary_rate[i] - late.auxiliary_rate[i]);
@@ -63,7 +63,7 @@ double slow_states_amiss(const Work& w) {
         most = std::max(most, wrong(next++));
         most = std::max(most, boosted * end.engine_full_load[e] * wrong(next++));
     }
-    return most * (end.at.time - w.scratch.begin().at.time) / 6;
+    return most * weight;
 }
 
 // Friction that falls as the slip grows lets it grow by itself, as e^(λt): what is amiss while it is small grows with it,
@@ -150,7 +150,7 @@ bool is_dense_coarse(Work& w, const Mode& mode) {
         }
         return moved;
     };
-    const double slow = m.auxiliary > 0 ? slow_states_amiss(w) : 0;
+    const double slow = slow_states_amiss(w, (end.at.time - w.scratch.begin().at.time) / 6);
     return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change, slow) ||
            friction_outruns_stages(w, [&](int k) { return dense_answer(w, mode, k); }) || hides_swing(w);
 }
@@ -161,7 +161,7 @@ bool swings_between(const Work& w, const Mode& mode) {
     const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
     const Swing& seen = w.scratch.tree.swing_seen;
     const double h = end.at.time - begin.at.time;
-    if (!(seen.error > twist_tolerance * h * std::max(seen.fastest, at_rest))) return false;
+    if (!matters(seen, ark3_twist_tolerance, h)) return false;
     const TreePaths& paths = mode.tree->paths;
     return seen.error * loops.largest(paths.stiffness, paths.groups) >
            rounding * loops.largest(end.groups.passed, paths.groups);
@@ -183,7 +183,7 @@ bool is_tree_coarse(Work& w, const Mode& mode) {
         m.tree->kernel.spread(t.masses, v.load, m.masses, of_mass);
         return m.kernel.loops.largest(of_mass, m.masses);
     };
-    return swings_between(w, mode) || takes_forces_amiss(w, late, weight * t.liveliness, change) ||
+    return swings_between(w, mode) || takes_forces_amiss(w, late, weight * t.liveliness, change, slow_states_amiss(w, weight)) ||
            friction_outruns_stages(w, [&](int k) { return tree_answer(t, h, k); });
 }
 
