@@ -65,10 +65,12 @@ Approached approach_margin(Work& w, const Mode& mode, const Crossing& crossing, 
     RootSearch search{done, until, left(w.scratch.begin()), left(w.scratch.end()),
                       done + crossing.theta * (until - done)};
     // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
-    // beyond. So too with a pair that lets go at next to no torque: this side of it, it would only lock again.
-    const bool by_itself = acts_by_itself(crossing.change), overrun = crossing.change == Change::overrun;
-    const double close_enough = (by_itself ? 1e-2 : overrun ? 1e-3 : 1e-6) * search.size();
-    const double beyond = (by_itself ? 3e-3 : overrun ? 3e-4 : 0) * (until - done);
+    // beyond. So too with a pair that lets go at next to no torque, or comes to hold its share: this side of it, it would
+    // only lock, or let go, again.
+    const bool by_itself = acts_by_itself(crossing.change),
+               safely = crossing.change == Change::overrun || crossing.change == Change::hold;
+    const double close_enough = (by_itself ? 1e-2 : safely ? 1e-3 : 1e-6) * search.size();
+    const double beyond = (by_itself ? 3e-3 : safely ? 3e-4 : 0) * (until - done);
     if (!mode.tree) look_ahead(w, mode, search, 1e-7 * search.size(), left);
     search.place = std::min(search.place + beyond, until);
     for (int steps = 1;; ++steps) {

@@ -7,6 +7,7 @@
 #include "plant/flanks.h"
 #include "plant/stuck_meshes.h"
 #include "plant/transitions.h"
+#include "plant/wedged.h"
 
 namespace shiftrig::plant::detail {
 namespace {
@@ -67,7 +68,7 @@ bool some_pair_strained(const Work& w, const Mode& mode, double share, const Sam
 // Is every state good until the end of the part? The usual answer, quickly; a no only sends us to look closely.
 bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
     const ModelData& m = w.model;
-    if (mode.rests || some_pair_strained(w, mode, 1, end) || !m.kernel.loops.senses_hold(speed_check(w)))
+    if (mode.rests || mode.wedges || some_pair_strained(w, mode, 1, end) || !m.kernel.loops.senses_hold(speed_check(w)))
         return false;
     const ContactTable& table = w.operators.table;
     const double *const drive = table.drive, *const offset = table.drive_offset,
@@ -122,6 +123,8 @@ double crossing_margin(Work& w, const Mode& mode, const Crossing& crossing, Samp
         case Change::overrun:
         case Change::flank:
             return margin(w, crossing.device, s);
+        case Change::hold:
+            return wedged_excess(w, mode, crossing.device, s);
         case Change::turn:
             return turning_margin(w, crossing.device, s);
         case Change::release:
@@ -188,6 +191,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
     w.scratch.turned = false;
     Crossing first;
     if (all_hold(w, mode, end) && flanks_hold(w, end)) return first;
+    first = first_to_hold(w, mode, begin, end);
     bool rates_known = false, middle_known = false, begin_known = false;
     for (int k = 0; k < m.first_flank; ++k) {
         if (!violated(w, mode, k, end)) continue;

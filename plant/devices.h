@@ -86,11 +86,13 @@ inline double opening_sense(const Work& w, int pair, double torque, const Sample
     return 2 * torque < difference ? -1 : 1;
 }
 
-// Of a locked pair ([Algin] eq. (12)). Capacities may be as small as the rounding of torques.
+// Of a locked pair ([Algin] eq. (12)). Capacities may be as small as the rounding of torques, and what came to hold in this
+// instant what it pushed with may be wrong by as much as the instant is.
 inline bool is_overloaded(const Work& w, int pair, const Sample& s) {
     if (pair < 0) return false;
-    const double torque = std::fabs(s.torque[pair]);
-    return torque > overload * static_limit(w, pair, s) && torque > 1e-11 * torque_scale(w, s);
+    const double torque = std::fabs(s.torque[pair]), limit = static_limit(w, pair, s);
+    const double most = w.scratch.eased[static_cast<std::size_t>(pair)] ? 1 + 1e-5 : overload;
+    return torque > most * limit && torque > 1e-11 * torque_scale(w, s);
 }
 
 }  // namespace shiftrig::plant::detail

@@ -85,7 +85,7 @@ static bool has_mesh_at_rest(const ModelData& m, const Mode& mode) {
 
 bool wedges(const ModelData& m, const Mode& mode) SHIFTRIG_REALTIME {
     bool found = false;
-    for (int k = 0; k < m.actuated_pairs; ++k) found = found || (!mode.key[k] && mode.bound[k]);
+    for (int k = 0; k < m.pairs; ++k) found = found || (!mode.key[k] && mode.bound[k]);
     return found;
 }
 

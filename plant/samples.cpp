@@ -68,6 +68,7 @@ ScratchData::ScratchData(const ModelData& m) {
     family.assign(bytes, 0);
     losses.resize(static_cast<std::size_t>(m.meshes));
     overcome.assign(static_cast<std::size_t>(m.pairs), 0);
+    eased.assign(static_cast<std::size_t>(m.pairs), 0);
     const auto longest = static_cast<std::size_t>(
         whole_panels(std::max({3 * m.states_padded, padded(m.torques), 3 * m.forces}) + m.states_padded +
                      m.columns + m.torques));

@@ -164,7 +164,8 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
             w.outputs.certificate.flags |= 2;
         }
         if (w.scratch.told_events < w.outputs.event_count) tell_closings(w, mode, s);
-        std::fill(w.scratch.overcome.begin(), w.scratch.overcome.end(), static_cast<unsigned char>(0));
+        for (auto* list : {&w.scratch.overcome, &w.scratch.eased})
+            std::fill(list->begin(), list->end(), static_cast<unsigned char>(0));
         return mode;
     }
 }

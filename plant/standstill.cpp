@@ -60,9 +60,11 @@ struct Search {
     unsigned char vertex[most_joints] = {};  // the joints' states in the exact solution,
     bool going[most_joints] = {};            // does it go?
     bool given_way[most_joints] = {};        // taken to have broken away
-    double use[most_joints] = {};            // of the static limits, before anything gives way
+    double carried[most_joints] = {};        // torques before anything gives way,
+    double use[most_joints] = {};            // as shares of the static limits
 
     unsigned char& overcome(int device) const { return w.scratch.overcome[static_cast<std::size_t>(device)]; }
+    unsigned char& eased(int device) const { return w.scratch.eased[static_cast<std::size_t>(device)]; }
     // Would the pair hold more than it passes once it slips in this sense?
     bool has_reserve(int device, double sense) const {
         if (device >= w.model.pairs || overcome(device)) return false;
@@ -74,7 +76,9 @@ struct Search {
     }
     void forget() {
         for (int i = 0; i < rest.count; ++i) {
-            if (given_way[i]) overcome(rest.joints[i].device) = 0;
+            const int device = rest.joints[i].device;
+            if (given_way[i]) overcome(device) = 0;
+            if (device < w.model.pairs) eased(device) = 0;
         }
     }
 
@@ -90,6 +94,14 @@ struct Search {
         return solve_rest_problem(split, rest);
     }
 
+    // A pair that can pass nothing yet is at both its limits: the sense is that in which it was torn loose.
+    unsigned char state_at(int i, int side) const {
+        const RestJoint& joint = rest.joints[i];
+        if (joint.mesh >= 0 || side == 0 || joint.upper != joint.lower) return state_of(rest, i, side);
+        const unsigned char was = w.contact[joint.device];
+        return slips(was) ? was : slipping(opening_sense(w, joint.device, carried[i], s));
+    }
+
     bool solve_exactly() {
         // In a corner that many splits share the exact problem may lead nowhere; that little give does not matter then.
         if (!solve(Split::any) && !solve(Split::as_modes)) return false;
@@ -97,7 +109,7 @@ struct Search {
         for (int i = 0; i < rest.count; ++i) {
             double share;
             const int side = side_of(rest, i, share);
-            vertex[i] = state_of(rest, i, side);
+            vertex[i] = state_at(i, side);
             going[i] = share > resting;
             goes = goes || going[i];
         }
@@ -108,7 +120,11 @@ struct Search {
     bool attempt(const StateOf& state) {
         unsigned char* const trial = w.scratch.trial.data();
         std::copy(w.contact, w.contact + w.model.contact_bytes, trial);
-        for (int i = 0; i < rest.count; ++i) trial[rest.joints[i].device] = state(i);
+        for (int i = 0; i < rest.count; ++i) {
+            const int device = rest.joints[i].device;
+            trial[device] = state(i);
+            if (device < w.model.pairs) eased(device) = slips(w.contact[device]) && trial[device] == closed;
+        }
         if (!is_consistent(w, rest.piece, trial, goes, s)) return false;
         // States that leave the one at its limit there, closed, are no answer.
         return gives_way < 0 || trial[gives_way] != closed ||
@@ -124,11 +140,26 @@ struct Search {
             return slipping(opening_sense(w, device, given, s));
         });
     }
+    // The one at its limit leaves the rest to one that pushed without holding anything so far, and could not hold its share.
+    bool attempt_held() {
+        if (goes || gives_way < 0) return false;
+        for (int held = 0; held < rest.count; ++held) {
+            const int pushes = rest.joints[held].device;
+            if (rest.joints[held].mesh >= 0 || pushes == gives_way || !slips(w.contact[pushes])) continue;
+            if (attempt([&](int i) {
+                    const int device = rest.joints[i].device;
+                    if (device == gives_way) return slipping(opening_sense(w, device, given, s));
+                    return device == pushes ? closed : w.contact[device];
+                }))
+                return true;
+        }
+        return false;
+    }
     // What does not go shares out its load.
     bool attempt_shared(Split split) {
         return solve(split) && attempt([&](int i) {
                    double share;
-                   return going[i] ? vertex[i] : state_of(rest, i, side_of(rest, i, share));
+                   return going[i] ? vertex[i] : state_at(i, side_of(rest, i, share));
                });
     }
     int most_used_of_going() const {
@@ -159,7 +190,8 @@ struct Search {
     bool find() {
         for (int i = 0; i < rest.count; ++i) {
             const int k = rest.joints[i].device;
-            if (rest.joints[i].mesh < 0) use[i] = std::fabs(s.torque[k]) / static_limit(w, k, s);
+            carried[i] = s.torque[k];
+            if (rest.joints[i].mesh < 0) use[i] = std::fabs(carried[i]) / static_limit(w, k, s);
         }
         int giving = 0;
         while (giving < rest.count && rest.joints[giving].device != gives_way) ++giving;
@@ -182,7 +214,8 @@ struct Search {
             if (attempt_least() || attempt_shared(Split::as_modes) || attempt_shared(Split::on_losses))
                 return true;
             if (break_more_away()) continue;
-            if (!breaks_away || overcome(gives_way)) return attempt([&](int i) { return vertex[i]; });
+            if (!breaks_away || overcome(gives_way))
+                return attempt_held() || attempt([&](int i) { return vertex[i]; });
             break_away(giving);  // it is at its limit whatever the split leaves it
         }
     }

@@ -5,6 +5,7 @@
 
 #include "plant/devices.h"
 #include "plant/modes.h"
+#include "plant/wedged.h"
 
 namespace shiftrig::plant::detail {
 namespace {
@@ -71,9 +72,9 @@ void tell_loops(Work& w, const Mode& mode, const Sample& s) {
 }
 
 // A pair that pushes at no slip, since others hold it there: what they carry of it hangs on what has been.
-bool is_wedged(const Work& w, const Mode& mode, const Sample& s) {
+bool some_pushes(const Work& w, const Mode& mode, const Sample& s) {
     for (int k = 0; k < w.model.actuated_pairs; ++k) {
-        if (slips(w.contact[k]) && mode.bound[k] && s.sliding[k] > 0) return true;
+        if (is_wedged(w, mode, k) && s.sliding[k] > 0) return true;
     }
     return false;
 }
@@ -150,7 +151,7 @@ void tell_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const Sample& s = w.scratch.begin();
     tell_turns(w, s);
     tell_loops(w, mode, s);
-    if (mode.redundant || (mode.wedges && is_wedged(w, mode, s))) w.outputs.certificate.flags |= 1;
+    if (mode.redundant || (mode.wedges && some_pushes(w, mode, s))) w.outputs.certificate.flags |= 1;
 }
 
 }  // namespace shiftrig::plant::detail

@@ -8,6 +8,7 @@
 #include "plant/settling.h"
 #include "plant/standstill.h"
 #include "plant/telling.h"
+#include "plant/wedged.h"
 
 namespace shiftrig::plant::detail {
 namespace {
@@ -160,6 +161,9 @@ void change_all(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     unsigned char* verdict = w.scratch.violations.data();
     for (int k = 0; k < w.model.first_flank; ++k)
         verdict[k] = !violated(w, mode, k, s) ? good : is_closed(k) ? opens : closes;
+    for (int k = 0; mode.wedges && k < w.model.pairs; ++k) {
+        if (is_wedged(w, mode, k) && may_hold(w, mode, k, s)) verdict[k] = closes;
+    }
     bool changed = false;
     for (int k = 0; k < w.model.first_flank; ++k) {
         if (verdict[k] == opens && k < w.model.pairs) {

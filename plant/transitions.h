@@ -18,6 +18,7 @@ enum class Change {
     overrun,  // a pair lets go in its weak sense
     limit,    // a stuck mesh stays, but has to leave to others what is too much for its loss
     flank,    // a flank closes or opens
+    hold,     // a pair that others keep from slipping can hold its share
 };
 
 // Once the crossing lies behind, settle() does the rest.
