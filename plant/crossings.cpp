@@ -186,12 +186,17 @@ double first_dip(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     return first;
 }
 
-Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME {
+Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end,
+                        bool locates) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     w.scratch.turned = false;
     Crossing first;
     if (all_hold(w, mode, end) && flanks_hold(w, end)) return first;
     first = first_to_hold(w, mode, begin, end);
+    const auto consider = [&](const Crossing& next) {
+        const bool by_time = locates || is_event(next.change) == is_event(first.change);
+        if (first.device < 0 || (by_time ? next.theta < first.theta : is_event(next.change))) first = next;
+    };
     bool rates_known = false, middle_known = false, begin_known = false;
     for (int k = 0; k < m.first_flank; ++k) {
         if (!violated(w, mode, k, end)) continue;
@@ -211,11 +216,11 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
             theta = parabola_root(margin(w, k, begin), sign * device_slip(w, k, begin.rate) * length,
                                   margin(w, k, end));
         }
-        if (first.device < 0 || theta < first.theta) first = {k, theta, change};
+        consider({k, theta, change});
     }
     if (!m.backlashes.empty()) {
         const Crossing flank = first_flank(w, begin, end);
-        if (flank.device >= 0 && (first.device < 0 || flank.theta < first.theta)) first = flank;
+        if (flank.device >= 0) consider(flank);
     }
     for (int r = mode.row_count - 1; r >= 0 && mode.rows[r] >= m.pairs + m.meshes; --r) {
         const int leader = mode.rows[r] - m.pairs - m.meshes;
@@ -229,12 +234,12 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
             const double before = loss_left(w, leader, begin);
             if (before < -rounding) continue;  // already, and nobody took the rest
             const double theta = std::max(before, 0.) / (std::max(before, 0.) - left);
-            if (first.device < 0 || theta < first.theta) first = {m.pairs + leader, theta, Change::limit};
+            consider({m.pairs + leader, theta, Change::limit});
             continue;
         }
         const double before = std::min(release_drive(w, mode, leader, begin), 0.);
         const double theta = before / (before - drive);
-        if (first.device < 0 || theta < first.theta) first = {m.pairs + leader, theta, Change::release};
+        consider({m.pairs + leader, theta, Change::release});
     }
     w.scratch.turned = false;
     double size = 0;
@@ -254,7 +259,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end) S
         if (g0 <= 0 && gm >= 0)
             continue;  // just turned: within rounding of the point where both losses agree
         const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
-        if (first.device < 0 || theta < first.theta) first = {k, theta, Change::turn};
+        consider({k, theta, Change::turn});
     }
     return first;
 }

@@ -11,6 +11,10 @@
 namespace shiftrig::plant::detail {
 namespace {
 
+constexpr int most_equal_parts = 256, most_levels = 14;
+constexpr int refined = 4, finer_by = 16, finer_by_bits = 4;  // so many of the first parts, into so many
+constexpr double most_radians = 0.25;                         // of a part: by so much L moves something in it
+
 // Loss in meshes, from their torques.
 double mesh_losses(const ModelData& m, const Mode& mode, const double* mesh_torques, const double* turning) {
     const double* const share = mode.loss_share;
@@ -84,39 +88,41 @@ void forces_at(const ScratchData& scratch, int count, double s, double* f) {
         f[k] = w0 * scratch.begin().f[k] + w1 * scratch.half.f[k] + w2 * scratch.late.f[k];
 }
 
-// An even number, at least the two of Simpson's rule.
-int ledger_parts(const Mode& mode, double fraction) {
-    return std::max(2, 2 * static_cast<int>(std::ceil(0.5 * mode.ledger_parts * fraction - 1e-9)));
+// The operators of one part of a level, for what has just been advanced.
+StepOperators operators_of_level(Work& w, const Mode& mode, int level, double length) {
+    ScratchData& s = w.scratch;
+    if (s.used.length == mode.step.length) return level == 0 ? mode.ledger : mode.ledger_of_level[level - 1];
+    return build_ledger_operators(w.model, mode, length, s.ledger_memory.data()->value, s.workspace,
+                                  s.workspace_index.data());
 }
 
-// Stiff shafts swing or die out within a step, where three points see nothing of them. The step's own solution is
-// followed through many parts (exact, as the step is) and the powers are summed over these.
-void book_finely(Work& w, const Mode& mode) {
+// Equal parts that follow one another: they begin `first` of them after the beginning of what is booked, and `all` would fill it.
+struct EqualParts {
+    int first = 0, last = 0;
+    double all = 0;
+};
+
+// What dies out or swings within a step, where three points see nothing of it. The step's own solution is
+// followed through many parts (exact, as the step is) and the powers are summed over these. Returns work of external forces.
+double book_parts(Work& w, const Mode& mode, const StepOperators& op, const EqualParts& equal,
+                  double* at_end) {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
-    const double h = s.end().at.time - s.begin().at.time;
-    StepOperators op = mode.ledger;
-    int parts = mode.ledger_parts;
-    if (s.used.length != mode.step.length) {
-        parts = ledger_parts(mode, h / w.h);
-        op = build_ledger_operators(m, mode, h / parts, s.ledger_memory.data()->value, s.workspace,
-                                    s.workspace_index.data());
-    }
+    const double h = s.end().at.time - s.begin().at.time, parts = equal.all;
     Sample& at = s.middle;
     const int n = mode.order, block = padded(n);
     // Of the three blocks of `advance` only the last is asked for.
     const double* const end_from_begin = op.from_begin + 2 * block * (n + m.forces);
-    double* const at_late = s.vector_a;
-    double* const at_end = at_late + block;
+    double* const at_late = at_end - block;
     double* const forces = s.vector_c;
-    for (int i = 0; i < n; ++i) at_end[i] = s.begin().z[mode.coordinates[i]];
     double external_work = 0;
-    for (int part = 0;; ++part) {
+    for (int part = equal.first;; ++part) {
         std::copy(at_end, at_end + n, at.f - n);
         show(m, mode, at_end, at, m.power_rows);
-        forces_at(s, m.forces, static_cast<double>(part) / parts, at.f);
+        forces_at(s, m.forces, part / parts, at.f);
         row_torques(m, mode, at);
-        const double weight = h / parts / 3 * (part == 0 || part == parts ? 1 : part % 2 ? 4 : 2);  // Simpson
+        const bool inside = part != equal.first && part != equal.last;
+        const double weight = h / parts / 3 * (!inside ? 1 : part % 2 ? 4 : 2);  // Simpson
         double loss =
             mesh_losses(m, mode, at.active + mode.first_mesh, at.turning) + damping_losses(m, mode, at.swing);
         for (int k = 0; k < m.first_external; ++k) {
@@ -130,17 +136,34 @@ void book_finely(Work& w, const Mode& mode) {
         for (std::size_t i = 0; i < m.translating.size(); ++i) {
             w.next[m.layout.distances + static_cast<int>(i)] -= weight * at.slip[m.translating_force[i]];
         }
-        if (2 * part == parts) {
+        if (2 * part == parts && part != equal.first) {  // once: levels share an end
             const double field = field_losses(m, s.half, at.slip);
             s.dissipated += 2 * h / 3 * field;
             s.input_work += 2 * h / 3 * field;
         }
-        if (part == parts) break;
+        if (part == equal.last) return external_work;
         m.kernel.multiply(end_from_begin, block, n + m.forces, at.f - n, nullptr, at_end);
         forces_at(s, m.forces, (part + 0.5) / parts, forces);
         m.kernel.multiply(op.from_half, 2 * block, m.forces, forces, at_late, at_late);
         forces_at(s, m.forces, (part + 1.) / parts, forces);
         m.kernel.multiply(op.from_late, block, m.forces, forces, at_end, at_end);
+    }
+}
+
+void book_finely(Work& w, const Mode& mode, const LedgerGrid& grid) {
+    const ModelData& m = w.model;
+    ScratchData& s = w.scratch;
+    const double h = s.end().at.time - s.begin().at.time;
+    double* const at_end = s.vector_a + padded(mode.order);
+    for (int i = 0; i < mode.order; ++i) at_end[i] = s.begin().z[mode.coordinates[i]];
+    double external_work = 0;
+    for (int level = grid.levels; level >= 0; --level) {  // the shortest parts come first
+        const EqualParts equal{level == grid.levels ? 0 : refined,
+                               level == 0 ? grid.parts : refined * finer_by,
+                               std::ldexp(grid.parts, finer_by_bits * level)};
+        if (equal.first == equal.last) continue;
+        external_work +=
+            book_parts(w, mode, operators_of_level(w, mode, level, h / equal.all), equal, at_end);
     }
     const double field =
         h / 6 * (field_losses(m, s.begin(), s.begin().slip) + field_losses(m, s.late, s.end().slip));
@@ -161,12 +184,59 @@ double stored_energy(const ModelData& m, const double* z, const unsigned char* c
     return energy;
 }
 
+LedgerGrid ledger_grid(const ModelData& m, const Mode& mode, double share) SHIFTRIG_REALTIME {
+    LedgerGrid grid;  // of two parts at least, as Simpson's rule asks for
+    grid.parts = std::max(2, 2 * static_cast<int>(std::ceil(0.5 * mode.ledger_parts * share - 1e-9)));
+    if (m.ledger_levels == 0) return grid;
+    const double length = mode.rate_norm * m.options.step_size * share;
+    if (length / grid.parts <= most_radians) return grid;
+    grid.parts = std::max(grid.parts, refined);
+    double radians = length / grid.parts;
+    for (; radians > most_radians && grid.levels < m.ledger_levels; radians /= finer_by) ++grid.levels;
+    return grid;
+}
+
+int most_ledger_levels(const Structure& s, double step_size) {
+    double fastest = 0;  // trace of J⁻¹ A D Aᵀ: what is held together is heavier and slower
+    for (const auto* elastics : {&s.shafts, &s.dampers}) {
+        for (const Elastic& elastic : *elastics) {
+            for (const Link& link : elastic.links) {
+                if (link.mass >= 0)
+                    fastest += elastic.damping * link.factor * link.factor /
+                               s.inertia[static_cast<std::size_t>(link.mass)];
+            }
+        }
+    }
+    int levels = 0;
+    double radians =
+        2 * fastest * step_size / most_equal_parts;  // the norm of a matrix is more than its rates
+    for (; radians > most_radians && levels < most_levels; radians /= finer_by) ++levels;
+    return levels;
+}
+
+void build_ledger(const ModelData& m, Mode& mode, double* workspace, int* integers) SHIFTRIG_REALTIME {
+    const int halvings = mode.step.halvings;
+    mode.ledger_parts = halvings == 0 ? 1 : halvings == 1 ? 4 : 4 << std::min(halvings, 6);
+    if (mode.ledger_parts == 1) return;
+    double length = m.options.step_size / mode.ledger_parts;
+    mode.ledger = build_ledger_operators(m, mode, length, mode.ledger_memory, workspace, integers);
+    const int levels = ledger_grid(m, mode, 1).levels;
+    for (int level = 0; level < levels; ++level) {
+        length /= finer_by;
+        StepOperators& op = mode.ledger_of_level[level];
+        op = build_ledger_operators(m, mode, length, op.from_begin, workspace, integers);
+    }
+}
+
 void book(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;
     ScratchData& s = w.scratch;
     const Sample &begin = s.begin(), &middle = s.middle, &end = s.end();
     const double h = end.at.time - begin.at.time;
-    if (!mode.tree && mode.ledger_parts > 1 && ledger_parts(mode, h / w.h) > 2) return book_finely(w, mode);
+    if (!mode.tree && mode.ledger_parts > 1) {
+        const LedgerGrid grid = ledger_grid(m, mode, s.used.length == mode.step.length ? 1 : h / w.h);
+        if (grid.parts > 2) return book_finely(w, mode, grid);
+    }
 
     // The forces with which the step was made act on the motion that it found: what they do is then what it did.
     const Sample* const motion[3] = {&begin, &middle, &end};

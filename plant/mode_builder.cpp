@@ -117,6 +117,7 @@ ModeSizes::ModeSizes(const ModelData& m) {
     force_torques = panel_size(m.torques + translating, m.forces);
     balance = panel_size(m.torques, m.columns + m.torques);
     operators = m.states_padded * (3 * m.columns + 5 * m.forces) + 4 * panel_rows;  // of one length
+    levels = m.ledger_levels * whole_panels(operators);
     sparse_rates = SparseRates::most_entries(m.states);
     key = (m.contact_bytes + 7) / 8 * 8;
 }

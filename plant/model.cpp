@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "plant/connectors.h"
+#include "plant/ledger.h"
 #include "plant/model_builder.h"
 #include "plant/model_decisions.h"
 #include "plant/modes.h"
@@ -205,6 +206,7 @@ void build_sizes(ModelData& m) {
         m.power_given.push_back(k >= m.first_external && k < m.first_flank_force ? 1 : 0);
     }
     m.swings = static_cast<int>(m.swing_damping.size());
+    m.ledger_levels = most_ledger_levels(s, m.options.step_size);
     for (auto* numbers : {&m.energy_factor, &m.static_factor, &m.sliding_at_rest, &m.shaft_stiffness,
                           &m.swing_damping, &m.power_lost, &m.power_given})
         numbers->resize(numbers->size() + loop_slack, 0.);

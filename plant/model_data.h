@@ -145,8 +145,9 @@ struct ModelData {
     std::vector<double> swing_damping;                   // of shafts, then dampers
     // Per force: 1 where its power is lost in a pair or bearing, where it comes from outside.
     std::vector<double> power_lost, power_given;
-    bool loses_in_fields = false;                     // there are tyres or converters
-    int swings = 0;                                   // shafts and dampers
+    bool loses_in_fields = false;  // there are tyres or converters
+    int swings = 0;                // shafts and dampers
+    int ledger_levels = 0;  // of ever shorter parts that the ledger may need where dampers act (ledger.h)
     std::vector<int> translating, translating_force;  // masses
     std::unique_ptr<TreeTopology> tree;               // of the engine for long chains; none: dense modes
     std::string engine_reason;                        // why so, in words

@@ -64,8 +64,9 @@ struct Mode {
     double* force_torques = nullptr;  // R_f alone              panels, rows + translating × forces
     double* balance = nullptr;  // C_Iᵀ J⁻¹ (M̃ − Ĉ M_R), in torques  panels, rows × (order + forces + rows)
     StepOperators step;    // for the model's step size
-    int ledger_parts = 1;  // into how many parts the ledger divides a step: stiff shafts swing within it
+    int ledger_parts = 1;  // into how many parts the ledger divides a step: shafts and dampers are fast
     StepOperators ledger;  // for one of them
+    StepOperators* ledger_of_level = nullptr;  // for shorter ones at its beginning (ledger.h)
     double *step_memory = nullptr, *ledger_memory = nullptr;
     // [L S̃] of the coordinates in energy variables, padded(order) × (order + forces), ‖L‖₁ of these [1/s], and per coordinate
     // its scale, then the reciprocals: from these the operators of any length are built.
@@ -83,12 +84,12 @@ inline bool is_shaft_closed(const ModelData& m, const Mode& mode, int shaft) noe
 // Room that a mode and its operators take, in doubles and ints.
 struct ModeSizes {
     int basis = 0, view = 0, mobility = 0, rates = 0, scaled_rates = 0, energy_root = 0, torques = 0,
-        force_torques = 0, balance = 0, operators = 0, sparse_rates = 0;
+        force_torques = 0, balance = 0, operators = 0, levels = 0, sparse_rates = 0;
     int key = 0;  // bytes, a multiple of 8
     explicit ModeSizes(const ModelData& model);
     int doubles() const noexcept {
         return basis + view + mobility + rates + scaled_rates + energy_root + torques + force_torques +
-               balance + 2 * operators + sparse_rates;
+               balance + 2 * operators + levels + sparse_rates;
     }
 };
 
@@ -140,6 +141,7 @@ struct OperatorsData {
     std::vector<std::array<Link, 3>> link_memory;
     std::vector<double> share_memory;
     std::vector<signed char> relation_memory;
+    std::vector<StepOperators> level_operators;
     std::vector<Mode> modes;
     std::vector<TreeMode> trees;  // one per mode where the model has a tree
     std::vector<TreeMass> tree_masses;

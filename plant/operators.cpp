@@ -85,7 +85,11 @@ void OperatorsData::place_matrices(const ModelData& m) {
     modes.resize(static_cast<std::size_t>(std::clamp(affordable, fewest_modes, most_modes)));
     memory = aligned_doubles(modes.size() * per_mode);
     double* at = memory.data()->value;
+    const auto levels = static_cast<std::size_t>(m.ledger_levels);
+    level_operators.resize(modes.size() * levels);
     for (Mode& mode : modes) {
+        mode.ledger_of_level =
+            level_operators.data() + static_cast<std::size_t>(&mode - modes.data()) * levels;
         const auto take = [&at](int doubles) { return std::exchange(at, at + whole_panels(doubles)); };
         mode.basis = take(sizes.basis);
         mode.view = take(sizes.view);
@@ -96,6 +100,8 @@ void OperatorsData::place_matrices(const ModelData& m) {
         mode.balance = take(sizes.balance);
         mode.step_memory = take(sizes.operators);
         mode.ledger_memory = take(sizes.operators);
+        for (std::size_t level = 0; level < levels; ++level)
+            mode.ledger_of_level[level].from_begin = take(sizes.operators);
         mode.scaled_rates = take(sizes.scaled_rates);
         mode.energy_root = take(sizes.energy_root);
         mode.sparse_rates.value = take(sizes.sparse_rates);
@@ -158,13 +164,7 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
         const double h = m.options.step_size;
         oldest->step = build_step_operators(m, *oldest, h, oldest->step_memory, scratch.workspace,
                                             scratch.workspace_index.data());
-        const int halvings = oldest->step.halvings;
-        oldest->ledger_parts = halvings == 0 ? 1 : halvings == 1 ? 4 : 4 << std::min(halvings, 6);
-        if (oldest->ledger_parts > 1) {
-            oldest->ledger =
-                build_ledger_operators(m, *oldest, h / oldest->ledger_parts, oldest->ledger_memory,
-                                       scratch.workspace, scratch.workspace_index.data());
-        }
+        build_ledger(m, *oldest, scratch.workspace, scratch.workspace_index.data());
     }
     list_row_links(m, *oldest);
     oldest->wedges = wedges(m, *oldest);

@@ -116,6 +116,10 @@ double tree_answer(const TreeMode& t, double length, int k) {
     return std::fabs(mobility) * length;
 }
 
+// A shaft that is mostly a damper takes so many parts or more to creep back. Its torque is its damper's, and there may be no other
+// torque in the machine to tell much from little by.
+constexpr double creeping = 50;
+
 // Twists (the last coordinates, just before f) half way, exact and by the cubic through both ends: what lies between does
 // not show at the ends.
 bool hides_swing(const Work& w) {
@@ -126,11 +130,17 @@ bool hides_swing(const Work& w) {
     for (int e = 0; e < m.twists; ++e) {
         const auto& links = m.shaft_rate[static_cast<std::size_t>(e)];
         const int i = m.masses + e;
-        const double cubic =
-            0.5 * (begin.z[i] + end.z[i]) + h / 8 * (slip_fast(links, begin.z) - slip_fast(links, end.z));
+        const double from = slip_fast(links, begin.z), to = slip_fast(links, end.z);
+        const double cubic = 0.5 * (begin.z[i] + end.z[i]) + h / 8 * (from - to);
         const double stiffness = m.structure.shafts[static_cast<std::size_t>(e)].stiffness;
-        hidden = std::max(hidden, stiffness * std::fabs(half.f[e - m.twists] - cubic));
+        const double missed = stiffness * std::fabs(half.f[e - m.twists] - cubic);
         strain = std::max(strain, stiffness * std::fabs(end.z[i]));
+        if (!(missed > hidden)) continue;
+        const double damping = m.swing_damping[static_cast<std::size_t>(e)];
+        const bool creeps = damping > creeping * stiffness * h;
+        if (creeps && missed <= swing_tolerance * damping * std::max(std::fabs(from), std::fabs(to)))
+            continue;
+        hidden = missed;
     }
     return hidden > rounding * strain && exceeds(w, hidden, swing_tolerance);
 }

@@ -106,9 +106,9 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         }
 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
-        Crossing first = first_crossing(w, *mode, s.begin(), s.end());
-        const bool inside =
-            first.device >= 0 && localise && outputs.certificate.events * length < m.maximum_events;
+        const bool locates = localise && outputs.certificate.events * length < m.maximum_events;
+        Crossing first = first_crossing(w, *mode, s.begin(), s.end(), locates);
+        const bool inside = locates && first.device >= 0;
         double reached = until;
         if (inside && changes_at_once(w, first, until - done)) {
             reached = done;
@@ -147,8 +147,8 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
             const bool moves = acts_by_itself(first.change) ? first.change != Change::limit
                                                             : change_state(w, first.device, s.begin());
             if (moves || --leans < 0) ++outputs.certificate.events;
-        } else if (first.device >= 0 && first.change != Change::turn && first.change != Change::limit) {
-            if (!acts_by_itself(first.change)) change_all(w, *mode, s.begin());
+        } else if (first.device >= 0 && is_event(first.change)) {
+            change_all(w, *mode, s.begin());
             if (localise) {
                 ++outputs.certificate.fall_backs;
                 log_event(w, {.time = s.begin().at.time,

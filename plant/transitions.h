@@ -26,6 +26,11 @@ constexpr bool acts_by_itself(Change change) noexcept {
     return change == Change::turn || change == Change::release || change == Change::limit;
 }
 
+// Of the others nothing is lost where they are not located: correct_directions() and settle() see to them.
+constexpr bool is_event(Change change) noexcept {
+    return change != Change::turn && change != Change::limit;
+}
+
 struct Crossing {
     int device = -1;   // contact byte: pair, mesh or flank; −1: nobody changes
     double theta = 1;  // where between begin and end, 0…1
@@ -35,7 +40,9 @@ struct Crossing {
 // The first device whose state does not hold until the end of the part just computed: a slip speed that
 // changes sign ([Algin] eq. (13)), a torque above the static capacity (eq. (12)). Where shafts are so stiff that
 // they swing within the step, reversals of power are looked for as well; elsewhere correct_directions() does.
-Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME;
+// Where no instant will be located (`locates` is false), an event stands before all that is none: it must not be hidden.
+Crossing first_crossing(Work& work, const Mode& mode, Sample& begin, Sample& end,
+                        bool locates = true) SHIFTRIG_REALTIME;
 
 // The same among flanks alone.
 Crossing first_flank(const Work& work, const Sample& begin, const Sample& end) SHIFTRIG_REALTIME;

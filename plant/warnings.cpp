@@ -149,6 +149,39 @@ void warn_of_contradicting_meshes(const std::vector<LookedAt>& states, std::vect
     }
 }
 
+// ---- dampers along a chain ------------------------------------------------------------------------
+
+// Three points of a step are all that the ledger along the tree has.
+void warn_of_fast_dampers(const Model& model, const std::vector<LookedAt>& states,
+                          std::vector<std::string>& warnings) {
+    if (!model.data().tree) return;
+    double fastest = 1 / model.step_size();  // [1/s]
+    std::string name;
+    for (const LookedAt& at : states) {
+        const Structure s = build_structure(at.state.description);
+        const Eigen::MatrixXd basis = swinging_motions(at.state.description, s, at.state.closed);
+        for (const auto* elastics : {&s.shafts, &s.dampers}) {
+            for (const Elastic& elastic : *elastics) {
+                // Of one damper alone: d aᵀ J⁻¹ a, among the motions that the rigid set leaves.
+                Eigen::RowVectorXd slip = Eigen::RowVectorXd::Zero(basis.cols());
+                for (const Link& link : elastic.links) {
+                    if (link.mass >= 0) slip += link.factor * basis.row(link.mass);
+                }
+                const double rate = elastic.damping * slip.squaredNorm();
+                if (!(rate > fastest)) continue;
+                fastest = rate;
+                name = elastic.name;
+            }
+        }
+    }
+    if (name.empty()) return;
+    warnings.push_back(
+        "damping of \"" + name +
+        format("\": a slip there dies out within %.2g ms, a step is %.2g ms: on the engine for long "
+               "chains the account of energy does not follow that (energy.defect tells)",
+               1e3 / fastest, 1e3 * model.step_size()));
+}
+
 // ---- gears ----------------------------------------------------------------------------------------
 
 void warn_of_tie_ups(const LookedAt& at, std::vector<std::string>& warnings) {
@@ -222,6 +255,7 @@ std::vector<std::string> model_warnings(const Model& model) {
     warn_of_contradicting_meshes(states, warnings);
     if (const std::string text = initial_speed_warning(model); !text.empty()) warnings.push_back(text);
     warn_of_what_steps_miss(model, states, warnings);
+    warn_of_fast_dampers(model, states, warnings);
     for (const LookedAt& at : states) {
         warn_of_tie_ups(at, warnings);
         warn_of_resonances(at, warnings);

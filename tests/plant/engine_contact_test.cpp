@@ -197,6 +197,52 @@ TEST(Clutch, NextStepRuleHasTheLargerErrorOfItsOrder) {
     EXPECT_EQ(rig.outputs.certificate.fall_backs, 0);
 }
 
+// A gear that nothing joins to the rest; its power turns at 90.3 ms.
+void put_beside(Description& d) {
+    d.masses.push_back(mass("p", 1, 50));
+    d.masses.push_back(mass("q", 1, 25));
+    d.gears = {lossy_gear("G", "p", "q", 2, 0.9, 0)};
+    d.sources = {source("p", Waveform{{{.from = 0, .offset = 100, .slope = -1107.4}}})};
+}
+
+// What comes later in a step than a reversal of power changes at its end all the same.
+TEST(Clutch, NextStepRuleHeedsWhatComesAfterAReversalOfPower) {
+    Description alone = two_inertias();
+    alone.transition = Transition::next_step;
+    Description beside = alone;
+    put_beside(beside);
+    Rig a(alone), b(beside);
+    while (a.state.time() < 0.2 - 1e-9) {
+        a.step();
+        b.step();
+        for (const char* name : {"mass.fast.speed", "mass.slow.speed"})
+            ASSERT_EQ(a.out(name), b.out(name)) << name << " at " << a.state.time();
+    }
+    EXPECT_EQ(a.times(EventKind::lock, "C"), b.times(EventKind::lock, "C"));
+    EXPECT_EQ(b.times(EventKind::drive_side, "G").size(), 1u);
+}
+
+// The reversal itself is corrected, and nothing to fall back for.
+TEST(Clutch, OneNotLocatedBehindAReversalOfPowerIsAFallBack) {
+    for (const bool locks : {false, true}) {
+        Description d = two_inertias();
+        d.maximum_events = 1;
+        if (!locks) d.clutches.clear();
+        d.masses.push_back(mass("first", 1, 90.2));
+        d.masses.push_back(mass("other", 1));
+        d.clutches.push_back(clutch("D", "first", "other", 500));  // takes the one event, at 90.2 ms
+        put_beside(d);
+        Rig rig(d);
+        rig.run(0.12);
+        EXPECT_EQ(rig.fall_backs, locks ? 1 : 0);
+        EXPECT_NEAR(rig.times(EventKind::lock, "D").at(0), 0.0902, 1e-9);
+        if (locks) {
+            EXPECT_NEAR(rig.times(EventKind::lock, "C").at(0), 0.091, 1e-12);
+        }
+        EXPECT_EQ(rig.times(EventKind::drive_side, "G").size(), 1u);
+    }
+}
+
 TEST(TieUp, ParallelClutchesShareInProportionToTheirCapacities) {
     Description d;
     d.name = "parallel";

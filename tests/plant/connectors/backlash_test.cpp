@@ -336,6 +336,25 @@ TEST(Backlash, TheNextStepRuleGivesNoEnergy) {
     EXPECT_NEAR(rig.out("energy.defect"), 0, 1e-7);
 }
 
+// The power of a gear that nothing joins to it turns 40 µs before the flank is reached, in the same step.
+TEST(Backlash, TheNextStepRuleHeedsAFlankBehindAReversalOfPower) {
+    Pair pair;
+    pair.half_gap = 0.0101;
+    Description alone = pair.description();
+    alone.transition = Transition::next_step;
+    Description beside = alone;
+    beside.masses.push_back(mass("p", 1, 50));
+    beside.masses.push_back(mass("q", 1, 25));
+    beside.gears = {lossy_gear("G", "p", "q", 2, 0.9, 0)};
+    beside.sources = {source("p", Waveform{{{.from = 0, .offset = 100, .slope = -100 / 5.01e-3}}})};
+    Rig a(alone), b(beside);
+    a.run(0.02);
+    b.run(0.02);
+    EXPECT_EQ(b.times(EventKind::drive_side, "G").size(), 1u);
+    EXPECT_EQ(a.times(EventKind::flank_closes, "B"), b.times(EventKind::flank_closes, "B"));
+    EXPECT_NEAR(a.times(EventKind::flank_closes, "B").at(0), 6e-3, 1e-12);
+}
+
 TEST(Backlash, ALongChainFallsBackToTheDenseEngineOrSaysWhy) {
     Description d = Pair{}.description();
     d.method = Method::ark3;
