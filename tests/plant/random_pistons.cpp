@@ -115,7 +115,11 @@ class Builder {
 
     void command(const std::string& input, const WetPlates& plates, ActuationHydraulic& valve) {
         const double full = valve.maximum_pressure, kiss = plates.return_pressure;
-        const auto partly = [&] { return dice_.uniform(valve.preload_pressure, kiss); };
+        // Not the very pressure of a spring that does not stiffen: whether that fills is for rounding to say.
+        const bool stiffens = valve.preload_pressure < kiss;
+        const auto partly = [&] {
+            return dice_.uniform(stiffens ? valve.preload_pressure : 0.7 * kiss, kiss);
+        };
         const auto pressed = [&] { return dice_.uniform(kiss, full); };
         const auto low = [&] { return dice_.chance(0.5) ? 0 : dice_.uniform(0, kiss); };
         double now = dice_.chance(0.55) ? 0 : dice_.chance(0.2) ? partly() : pressed();
