@@ -25,6 +25,10 @@ target_link_libraries(agreement_test PRIVATE shiftrig_comparison GTest::gtest_ma
 target_compile_definitions(agreement_test PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
 gtest_discover_tests(agreement_test)
 
+add_executable(random_pistons_test plant/random_pistons_test.cpp)
+target_link_libraries(random_pistons_test PRIVATE shiftrig_comparison GTest::gtest_main)
+gtest_discover_tests(random_pistons_test)
+
 add_executable(library_examples_test plant/library_examples_test.cpp)
 target_link_libraries(library_examples_test PRIVATE shiftrig_comparison GTest::gtest_main)
 target_compile_definitions(library_examples_test PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
