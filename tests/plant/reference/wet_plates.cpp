@@ -35,6 +35,7 @@ OilNow oil_now(const Oil& oil) {
 }
 
 struct Wet {
+    std::size_t pair = 0;  // its place among them
     WetPlates p;
     std::shared_ptr<const ValvePressure> valve;
     std::shared_ptr<const Pistons> pistons;
@@ -80,7 +81,7 @@ std::function<double(double)> open_drag(const WetPlates& p, const Oil& oil, doub
 
 void add_wet_plates(System& system, const Description& d, const Tell& told, double until) {
     const OilNow oil = d.oil ? oil_now(*d.oil) : OilNow{};
-    std::vector<std::pair<std::size_t, Wet>> all;  // with their places among the pairs
+    std::vector<Wet> all;
     std::vector<Piston> pistons;
     for (std::size_t i = 0; i < d.clutches.size(); ++i) {
         const Clutch& c = d.clutches[i];
@@ -88,6 +89,7 @@ void add_wet_plates(System& system, const Description& d, const Tell& told, doub
         const auto& hydraulic = std::get<ActuationHydraulic>(c.actuation);
         const std::string prefix = "clutch." + c.name + ".";
         Wet wet;
+        wet.pair = i;
         wet.p = std::get<WetPlates>(c.friction);
         wet.valve = valve_of(hydraulic, oil, told(prefix + "pressure_command", hydraulic.initial));
         wet.leak = told(prefix + "leak", 0);
@@ -97,14 +99,14 @@ void add_wet_plates(System& system, const Description& d, const Tell& told, doub
             pistons.push_back({wet.valve, hydraulic.preload_pressure, wet.p.return_pressure,
                                hydraulic.fill_volume, hydraulic.fill_flow * oil.fill_flow});
         }
-        all.emplace_back(i, wet);
+        all.push_back(wet);
     }
     const auto filling =
         std::make_shared<const Pistons>(pistons, d.oil ? d.oil->pump_flow : 0, pistons.empty() ? 0 : until);
     filling->breaks(system.breaks);
-    for (auto& [i, wet] : all) {
-        const Clutch& c = d.clutches[i];
-        Friction& f = system.frictions[i];
+    for (Wet& wet : all) {
+        const Clutch& c = d.clutches[wet.pair];
+        Friction& f = system.frictions[wet.pair];
         wet.pistons = filling;
         if (c.drag) f.open = open_drag(wet.p, *d.oil, oil.viscosity);
         const double full =
