@@ -70,15 +70,29 @@ void begin_hydraulics(Work& w, int pair) noexcept {
     if (hydraulic.solenoid) pressure = solenoid_pressure(*hydraulic.solenoid, state.play, pressure);
     const std::span<double> line(w.next + law.actuator + hydraulic_slots,
                                  static_cast<std::size_t>(law.delay_slots));
-    const StepValues valve = valve_over_step(hydraulic, op, state, line, pressure, command.valve_held);
+    const ValveTargets targets = latch_command(hydraulic, op, state, line, pressure);
+    const ValveBefore before{state, targets};
+    const StepValues valve = valve_over_step(hydraulic, op, state, targets, command.valve_held);
     if (needs_course(hydraulic, return_pressure, state.piston, valve)) {
         const auto n = static_cast<std::size_t>(s.piston_count++);
         s.piston_pairs[n] = pair;
         s.pistons[n] = begin_piston(hydraulic, return_pressure, op.fill_flow, op.h, state.piston, valve);
+        s.piston_valves[n] = before;
     } else {
         take_course(w, pair, end_step(hydraulic, valve, state));
     }
     write_hydraulic(w.next + law.actuator, state);
+}
+
+// Where one piston may change its motion, and with it the share of the others, all are looked at more closely.
+void sample_valves(Work& w, std::span<PistonCourse> pistons) noexcept {
+    ScratchData& s = w.scratch;
+    if (std::all_of(pistons.begin(), pistons.end(), needs_no_samples)) return;
+    for (std::size_t n = 0; n < pistons.size(); ++n) {
+        if (is_constant(pistons[n].valve)) continue;
+        const auto pair = static_cast<std::size_t>(s.piston_pairs[n]);
+        sample_valve(w.operators.hydraulics[pair], s.piston_valves[n], pistons[n]);
+    }
 }
 
 void end_hydraulics(Work& w, int pair, const PistonCourse& piston) noexcept {
@@ -158,7 +172,9 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
         if (!is_quiet(w, k)) begin_hydraulics(w, k);
     }
     const auto count = static_cast<std::size_t>(s.piston_count);
-    advance_pistons({s.pistons.data(), count}, m.description.oil ? m.description.oil->pump_flow : 0);
+    const std::span<PistonCourse> pistons(s.pistons.data(), count);
+    sample_valves(w, pistons);
+    advance_pistons(pistons, m.description.oil ? m.description.oil->pump_flow : 0);
     for (std::size_t n = 0; n < count; ++n) end_hydraulics(w, s.piston_pairs[n], s.pistons[n]);
     for (const int k : m.pedal_pairs) advance_pedal(w, k);
     for (const int k : m.waveform_pairs) {

@@ -61,6 +61,7 @@ ScratchData::ScratchData(const ModelData& m) {
     held.assign(static_cast<std::size_t>(m.pairs) + loop_slack, 0.);
     for (auto* list : {&moving, &piston_pairs}) list->assign(static_cast<std::size_t>(m.pairs), 0);
     pistons.resize(static_cast<std::size_t>(m.pairs));
+    piston_valves.resize(static_cast<std::size_t>(m.pairs));
     moves.assign(static_cast<std::size_t>(m.pairs), 0);
     engine_modes.resize(m.engines.size());
     const auto bytes = static_cast<std::size_t>(whole_words(m.contact_bytes));
@@ -117,6 +118,7 @@ void Scratch::fill_with_nan() noexcept {
         load.hydraulic.spring_begin = load.hydraulic.spring_end = nan;
     }
     for (PistonCourse& c : s.pistons) c.piston = c.excess = c.rate = c.next = nan;
+    for (ValveBefore& v : s.piston_valves) v.state.valve = v.state.slewed = v.targets.late = nan;
     s.dissipated = s.input_work = nan;
 }
 

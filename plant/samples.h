@@ -98,6 +98,7 @@ struct ScratchData {
     std::vector<int> moving;           // the pairs whose load does
     std::vector<int> piston_pairs;     // the pairs whose piston may move, and how it does
     std::vector<PistonCourse> pistons;
+    std::vector<ValveBefore> piston_valves;
     int moving_count = 0, piston_count = 0;
     std::vector<EngineMode> engine_modes;                                    // at the beginning of the step
     std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes

@@ -84,6 +84,7 @@ struct HydraulicOperator {
     double omega = 0;                // valve frequency at this oil [rad/s]
     double two_zeta_over_omega = 0;  // [s]
     ValveOperator half;              // over h/2
+    ValveOperator piece;             // over half a part of a piston's course
     double fill_flow = 0;            // [m³/s] at this oil, full pump
 };
 
@@ -95,6 +96,7 @@ inline HydraulicOperator hydraulic_operator(const ActuationHydraulic& p, const O
     op.omega = p.natural_frequency * oil.valve_frequency_factor;
     op.two_zeta_over_omega = op.omega > 0 ? 2 * p.damping_ratio / op.omega : 0;
     op.half = valve_operator(op.omega, p.damping_ratio, 0.5 * h);
+    if (has_piston(p)) op.piece = valve_operator(op.omega, p.damping_ratio, 0.5 * h / piston_parts);
     op.fill_flow = p.fill_flow * oil.fill_flow_factor;
     return op;
 }
@@ -149,8 +151,7 @@ struct HydraulicStep {
     double chamber(double s) const noexcept { return chamber(s, false); }
     // The same pressure all the time.
     bool rests() const noexcept {
-        return valve.begin == valve.end && valve.begin == valve.middle &&
-               (filled_from <= 0 || (filled_from > 1 && spring_begin == spring_end));
+        return is_constant(valve) && (filled_from <= 0 || (filled_from > 1 && spring_begin == spring_end));
     }
 };
 
@@ -161,7 +162,9 @@ inline void advance_valve(const HydraulicOperator& op, double zeta, HydraulicSta
     const double end = state.slewed + slope * dt;
     if (op.omega > 0) {
         const double lag = op.two_zeta_over_omega * slope;
-        const ValveOperator phi = dt == op.half.duration ? op.half : valve_operator(op.omega, zeta, dt);
+        const ValveOperator phi = dt == op.half.duration    ? op.half
+                                  : dt == op.piece.duration ? op.piece
+                                                            : valve_operator(op.omega, zeta, dt);
         const double y = state.valve - (state.slewed - lag), rate = state.valve_rate - slope;
         state.valve = end - lag + phi.pp * y + phi.pv * rate;
         state.valve_rate = slope + phi.vp * y + phi.vv * rate;
@@ -212,11 +215,15 @@ inline bool is_quiet(const ActuationHydraulic& p, double return_pressure, const 
            (!has_piston(p) || state.piston == balanced_stroke(p, return_pressure, target));
 }
 
-// The valve's outlet pressure over one step with the pressure command `command` held over it. `valve_held`: the valve
-// sticks and keeps its outlet pressure.
-inline StepValues valve_over_step(const ActuationHydraulic& p, const HydraulicOperator& op,
-                                  HydraulicState& state, std::span<double> delay_line, double command,
-                                  bool valve_held) noexcept {
+// What the valve is told over one step: early until `change` [s], late from then on.
+struct ValveTargets {
+    double early = 0, late = 0, change = 0;
+};
+
+// With the pressure command `command` held over the step.
+inline ValveTargets latch_command(const ActuationHydraulic& p, const HydraulicOperator& op,
+                                  HydraulicState& state, std::span<double> delay_line,
+                                  double command) noexcept {
     const std::size_t slots = delay_line.size();
     const auto head = static_cast<std::size_t>(state.head);
     delay_line[head] = limited_command(p, command);
@@ -232,11 +239,26 @@ inline StepValues valve_over_step(const ActuationHydraulic& p, const HydraulicOp
     const std::size_t late_slot = head >= whole ? head - whole : head + slots - whole;
     const double late = delay_line[late_slot];
     const double early = change > 0 ? delay_line[late_slot > 0 ? late_slot - 1 : slots - 1] : late;
+    return {early, late, change};
+}
 
+// On from the time `from` of the step, by dt.
+inline void drive_valve(const ActuationHydraulic& p, const HydraulicOperator& op, HydraulicState& state,
+                        double from, double dt, const ValveTargets& targets) noexcept {
+    if (targets.early == targets.late) return detail::drive_valve(p, op, state, dt, targets.late);
+    const double first = std::clamp(targets.change - from, 0., dt);
+    detail::drive_valve(p, op, state, first, targets.early);
+    detail::drive_valve(p, op, state, dt - first, targets.late);
+}
+
+// The valve's outlet pressure over one step. `valve_held`: the valve sticks and keeps its outlet pressure.
+inline StepValues valve_over_step(const ActuationHydraulic& p, const HydraulicOperator& op,
+                                  HydraulicState& state, const ValveTargets& targets,
+                                  bool valve_held) noexcept {
     StepValues valve;
     valve.begin = state.valve;
-    if (early == late && detail::valve_rests(state, late)) {
-        state.valve = late;
+    if (targets.early == targets.late && detail::valve_rests(state, targets.late)) {
+        state.valve = targets.late;
         state.valve_rate = 0;
         valve.middle = valve.end = state.valve;
         return valve;
@@ -245,22 +267,42 @@ inline StepValues valve_over_step(const ActuationHydraulic& p, const HydraulicOp
         state.slewed = state.valve;
         state.valve_rate = 0;
         valve.middle = state.valve;
-    } else if (early == late) {
-        detail::drive_valve(p, op, state, 0.5 * op.h, late);
-        valve.middle = state.valve;
-        detail::drive_valve(p, op, state, 0.5 * op.h, late);
     } else {
         const double half = 0.5 * op.h;
-        const double first = change < half ? change : half;
-        detail::drive_valve(p, op, state, first, early);
-        detail::drive_valve(p, op, state, half - first, late);
+        drive_valve(p, op, state, 0, half, targets);
         valve.middle = state.valve;
-        const double second = change > half ? change - half : 0;
-        detail::drive_valve(p, op, state, second, early);
-        detail::drive_valve(p, op, state, half - second, late);
+        drive_valve(p, op, state, half, half, targets);
     }
     valve.end = state.valve;
     return valve;
+}
+
+inline StepValues valve_over_step(const ActuationHydraulic& p, const HydraulicOperator& op,
+                                  HydraulicState& state, std::span<double> delay_line, double command,
+                                  bool valve_held) noexcept {
+    const ValveTargets targets = latch_command(p, op, state, delay_line, command);
+    return valve_over_step(p, op, state, targets, valve_held);
+}
+
+// What it takes to look at the valve within a step.
+struct ValveBefore {
+    HydraulicState state;  // at its beginning
+    ValveTargets targets;
+};
+
+inline void sample_valve(const HydraulicOperator& op, const ValveBefore& before,
+                         PistonCourse& course) noexcept {
+    HydraulicState state = before.state;
+    const double piece = op.piece.duration;
+    ValveSamples& samples = course.samples;
+    samples.front() = course.valve.begin;
+    for (std::size_t i = 1; i < samples.size(); ++i) {
+        drive_valve(*course.description, op, state, static_cast<double>(i - 1) * piece, piece,
+                    before.targets);
+        samples[i] = state.valve;
+    }
+    samples.back() = course.valve.end;  // but for rounding
+    course.is_sampled = true;
 }
 
 // There is a piston and this step may move it.

@@ -17,4 +17,8 @@ struct StepValues {
     }
 };
 
+inline bool is_constant(const StepValues& y) noexcept {
+    return y.begin == y.middle && y.begin == y.end;
+}
+
 }  // namespace shiftrig::plant

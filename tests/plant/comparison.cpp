@@ -189,11 +189,11 @@ class Teller {
     std::size_t next_ = 0;
 };
 
-// A vehicle begins in motion: engines and tyres as in steady running.
+// A vehicle begins in motion: engines and tyres as in steady running; actuators as they are told at the beginning.
 State begin(const Model& model, const Changes& changes, const plant::Inputs& inputs) {
     const Description& d = model.description();
     State state(model);
-    if (!has_fields(d) && changes.empty()) return state;
+    if (!has_fields(d) && (changes.empty() || changes.front().time > 0)) return state;
     Start told;
     for (const auto& m : d.masses) told.speeds.emplace_back(m.name, m.initial_speed);
     for (const auto& c : d.clutches)
@@ -303,7 +303,7 @@ Deviation deviation(const Description& description, const Result& truth, const R
 
 Result run_reference(const Description& description, const ComparisonOptions& options,
                      reference::Sharing sharing, int refinement, const Changes& inputs) {
-    const reference::System system = reference::system_of(description, inputs);
+    const reference::System system = reference::system_of(description, inputs, options.seconds);
     reference::Solver solver(system, sharing);
     const double finer = 1. / refinement;
     return solver.run(options.seconds, {.step = (has_fields(description) ? 2e-5 : 1e-5) * finer,
@@ -320,6 +320,8 @@ Description perturbed(Description d, double relative, std::uint64_t seed) {
             dry->sliding_capacity *= factor();
         else
             std::get<WetPlates>(c.friction).piston_area *= factor();
+        if (auto* valve = std::get_if<ActuationHydraulic>(&c.actuation); valve && valve->fill_volume > 0)
+            valve->fill_volume *= factor();
     }
     for (auto& f : d.freewheels) f.rated_torque *= factor();
     for (auto& b : d.backlashes) b.initial_twist *= factor();
@@ -418,7 +420,7 @@ Comparison compare(const RandomSystem& system, std::uint64_t seed, const Compari
         Table image = run_plant(mirrored(d), mirrored(system.inputs), layout, seed, options).table;
         for (auto& row : image.rows)
             for (std::size_t i = 0; i < row.size(); ++i)
-                if (layout.unit[i] != Quantity::joule) row[i] = -row[i];
+                if (layout.unit[i] != Quantity::joule && layout.unit[i] != Quantity::pascal) row[i] = -row[i];
         Table upright = run.table;
         upright.unit = layout.unit;
         upright.unique = layout.unique;
@@ -483,6 +485,9 @@ std::string describe(const Description& d) {
             s += text(", return %.4g clearance %.3g; valve %.3g s %.4g rad/s %.3g slew %.4g, %.4g Pa",
                       wet->return_pressure, wet->clearance, valve.dead_time, valve.natural_frequency,
                       valve.damping_ratio, valve.slew, valve.maximum_pressure);
+            if (valve.fill_volume > 0)
+                s += text("; piston from %.4g Pa, %.4g m3 at %.4g m3/s", valve.preload_pressure,
+                          valve.fill_volume, valve.fill_flow);
         }
         if (const auto* a = std::get_if<ActuationApply>(&c.actuation))
             s += text(" applied, lag %.4g", a->lag);
@@ -491,6 +496,9 @@ std::string describe(const Description& d) {
         if (const auto* direct = std::get_if<ActuationDirect>(&c.actuation)) s += text_of(direct->profile);
         s += "\n";
     }
+    if (d.oil)
+        s += text("  oil of %.4g Pa s at 0 degC, %.4g degC, pump %.4g m3/s\n", d.oil->viscosity_at_zero,
+                  d.oil->initial_temperature, d.oil->pump_flow);
     for (const auto& f : d.freewheels)
         s += text("  freewheel %s %s-%s blocks %s %.6g Nm share %.4g drag %.4g\n", f.name.c_str(),
                   f.a.c_str(), f.b.c_str(), f.blocks == Sense::forward ? "forward" : "backward",

@@ -13,6 +13,7 @@
 #include "io/number.h"
 #include "tests/plant/comparison.h"
 #include "tests/plant/random_forests.h"
+#include "tests/plant/random_pistons.h"
 #include "tests/plant/random_vehicles.h"
 
 namespace {
@@ -44,6 +45,7 @@ const std::map<std::string, Maker> kinds = {
     {"lossy_forests", random_lossy_forest},
     {"vehicles", random_vehicle},
     {"wet_vehicles", random_vehicle_with_wet_clutches},
+    {"pistons", random_machine_with_pistons},
 };
 
 struct Arguments {
@@ -59,7 +61,7 @@ struct Arguments {
 const char usage[] =
     "usage: shiftrig_random_systems [--count N] [--seed S | --seeds A,B,…] [--seconds T] [--jobs J] "
     "[--substeps K] "
-    "[--kind plain|freewheels|backlashes|tables|brakes|forests|lossy_forests|vehicles|wet_vehicles] "
+    "[--kind plain|freewheels|backlashes|tables|brakes|forests|lossy_forests|vehicles|wet_vehicles|pistons] "
     "[--mounts] [--quick] [--method etd3|ark3] [--verbose]\n"
     "  systems S … S+N−1, or those named, each simulated for T seconds at 1 ms / K; --mounts hangs masses on "
     "springs to the housing; --quick asks only where runs differ whether a machine is sensitive; --verbose "

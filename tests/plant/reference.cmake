@@ -1,5 +1,5 @@
 # The independent solver, its own proof, and what it proves about the plant.
-add_library(shiftrig_reference STATIC plant/reference/system.cpp plant/reference/fields.cpp plant/reference/modes.cpp plant/reference/solver.cpp plant/reference/run.cpp
+add_library(shiftrig_reference STATIC plant/reference/system.cpp plant/reference/fields.cpp plant/reference/piston.cpp plant/reference/wet_plates.cpp plant/reference/modes.cpp plant/reference/solver.cpp plant/reference/run.cpp
             plant/reference/linear_program.cpp plant/reference/cases.cpp plant/reference/curves.cpp plant/reference/tractor.cpp)
 target_link_libraries(shiftrig_reference PUBLIC shiftrig_options Eigen3::Eigen)
 
@@ -8,7 +8,7 @@ target_link_libraries(reference_solver_test PRIVATE shiftrig_reference GTest::gt
 target_compile_definitions(reference_solver_test PRIVATE SHIFTRIG_DATA="${CMAKE_SOURCE_DIR}/tests/data")
 gtest_discover_tests(reference_solver_test)
 
-add_library(shiftrig_comparison STATIC plant/random_systems.cpp plant/random_forests.cpp plant/random_vehicles.cpp plant/comparison.cpp plant/tractor_comparison.cpp)
+add_library(shiftrig_comparison STATIC plant/random_systems.cpp plant/random_forests.cpp plant/random_vehicles.cpp plant/random_pistons.cpp plant/comparison.cpp plant/tractor_comparison.cpp)
 target_link_libraries(shiftrig_comparison PUBLIC shiftrig_reference shiftrig_plant)
 
 # Thousands by hand: shiftrig_random_systems --count 10000 --seed 1 --seconds 0.2 --jobs 2
@@ -24,6 +24,10 @@ add_executable(agreement_test plant/agreement_test.cpp)
 target_link_libraries(agreement_test PRIVATE shiftrig_comparison GTest::gtest_main)
 target_compile_definitions(agreement_test PRIVATE SHIFTRIG_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
 gtest_discover_tests(agreement_test)
+
+add_executable(random_pistons_test plant/random_pistons_test.cpp)
+target_link_libraries(random_pistons_test PRIVATE shiftrig_comparison GTest::gtest_main)
+gtest_discover_tests(random_pistons_test)
 
 add_executable(library_examples_test plant/library_examples_test.cpp)
 target_link_libraries(library_examples_test PRIVATE shiftrig_comparison GTest::gtest_main)

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <numbers>
 #include <utility>
 #include <variant>
 
-#include "tests/plant/reference/valve.h"
+#include "tests/plant/reference/wet_plates.h"
 
 namespace shiftrig::reference {
 namespace {
@@ -178,33 +177,19 @@ struct Lagged {
     double at(When when, const Vector& z) const { return lag > 0 ? z[position] : command.at(when.inside); }
 };
 
-// Wet plates behind a valve.
-struct Wet {
-    WetPlates p;
-    std::shared_ptr<const ValvePressure> pressure;
-    double radius() const {
-        const double o = p.outer_radius, i = p.inner_radius;
-        return 2. / 3 * (o * o * o - i * i * i) / (o * o - i * i);
-    }
-    double load(double t) const {
-        return std::max(0., pressure->at(t) - p.return_pressure) * p.piston_area * radius() * p.surfaces;
-    }
-    double friction(double slip) const {
-        return p.mu_sliding + p.mu_rise * std::exp(-std::abs(slip) * radius() / p.mu_speed);
-    }
-};
-
 class Builder {
   public:
-    Builder(const Description& d, const std::vector<InputChange>& inputs)
-        : d_(d), inputs_(inputs), system_(plain(d)) {}
+    Builder(const Description& d, const std::vector<InputChange>& inputs, double until)
+        : d_(d), inputs_(inputs), until_(until), system_(plain(d)) {}
 
     System build() {
         next_ = system_.masses + system_.shafts;
         add_tyres();
         add_engines();
         add_actuators();
-        add_wet_plates();
+        add_wet_plates(
+            system_, d_, [this](const std::string& input, double initial) { return told(input, initial); },
+            until_);
         for (const auto& c : d_.converters)
             converters_.push_back({c, system_.mass(c.pump), system_.mass(c.turbine)});
         for (const auto& r : d_.roads)
@@ -332,39 +317,6 @@ class Builder {
             lagged_.push_back(actuator);
         }
     }
-    void add_wet_plates() {
-        for (std::size_t i = 0; i < d_.clutches.size(); ++i) {
-            const Clutch& c = d_.clutches[i];
-            if (!is_wet(c)) continue;
-            const auto& hydraulic = std::get<ActuationHydraulic>(c.actuation);
-            const Told command = told("clutch." + c.name + ".pressure_command", hydraulic.initial);
-            Table later;
-            for (const auto& change : command.changes)
-                if (change.first > 0) later.push_back(change);
-            Friction& f = system_.frictions[i];
-            Wet wet{.p = std::get<WetPlates>(c.friction),
-                    .pressure = std::make_shared<const ValvePressure>(hydraulic, command.at(0), later)};
-            wet.pressure->breaks(system_.breaks);
-            if (c.drag) {
-                const double o = std::pow(wet.p.outer_radius, 4), n = std::pow(wet.p.inner_radius, 4);
-                const double viscosity = d_.oil->viscosity_at_zero *
-                                         std::exp(-d_.oil->viscosity_decay * d_.oil->initial_temperature);
-                const double drag =
-                    wet.p.surfaces * std::numbers::pi * viscosity * (o - n) / (2 * wet.p.clearance);
-                const double most = d_.oil->drag_speed_limit;
-                f.open = [drag, most](double slip) { return drag * std::clamp(slip, -most, most); };
-            }
-            const double full = (hydraulic.maximum_pressure - wet.p.return_pressure) * wet.p.piston_area *
-                                wet.radius() * wet.p.surfaces;
-            f.nominal = full * wet.p.mu_static;
-            f.sliding = [wet](When when, const Vector&, double slip) {
-                return wet.load(when.t) * wet.friction(slip);
-            };
-            f.holding = [wet](When when, const Vector&) { return wet.load(when.t) * wet.p.mu_static; };
-            const double mobility = f.column.cwiseAbs2().cwiseQuotient(system_.inertia).sum();
-            answers(full * std::abs(wet.p.mu_rise) * wet.radius() / wet.p.mu_speed * mobility);
-        }
-    }
     // Whatever resists one body holds it at rest together.
     void add_resistances() {
         for (int body = 0; body < system_.masses; ++body) {
@@ -474,6 +426,7 @@ class Builder {
 
     const Description& d_;
     const std::vector<InputChange>& inputs_;
+    double until_;  // [s]
     System system_;
     int next_ = 0;
     std::vector<Tyre> tyres_;
@@ -486,11 +439,11 @@ class Builder {
 
 }  // namespace
 
-System system_of(const Description& description, const std::vector<InputChange>& inputs) {
+System system_of(const Description& description, const std::vector<InputChange>& inputs, double until) {
     if (description.tyres.empty() && description.engines.empty() && description.converters.empty() &&
         description.roads.empty() && description.ploughs.empty() && inputs.empty())
         return System(description);
-    return Builder(description, inputs).build();
+    return Builder(description, inputs, until).build();
 }
 
 }  // namespace shiftrig::reference

@@ -32,7 +32,8 @@ struct Told {
     }
 };
 
-// A machine without any is the same as System(description).
-System system_of(const plant::Description& description, const std::vector<InputChange>& inputs);
+// A machine without any is the same as System(description). What does not feel the mechanics, the pistons of wet clutches, is
+// known until the time `until` [s].
+System system_of(const plant::Description& description, const std::vector<InputChange>& inputs, double until);
 
 }  // namespace shiftrig::reference

@@ -135,7 +135,17 @@ struct System {
     // What is decided at whole milliseconds only: may change extra states, returns whether it did.
     std::function<bool(When, Vector& z)> at_grid;
     // What else is shown, and in which unit it is to be compared.
-    enum class Unit { radian_per_second, radian, newton_metre, metre_per_second, newton, slip, joule, count };
+    enum class Unit {
+        radian_per_second,
+        radian,
+        newton_metre,
+        metre_per_second,
+        newton,
+        slip,
+        joule,
+        pascal,
+        count
+    };
     struct Shown {
         std::string name;
         Unit unit;
