@@ -133,9 +133,8 @@ void complete_swing(const ModelData& m, const TreeMode& t, TreeWork& v, double h
                     const double* net, GroupState& end) {
     const TreeKernel& kernel = m.tree->kernel;
     const StageSums sums = stage_sums(swing_impulse, embedded_error, stages, net, v, h);
-    if (!matters(kernel.swing_error(t.paths, sums, ark3_swing_tolerance * h, v.way), ark3_swing_tolerance, h))
-        return;
-    v.swing_seen = kernel.swing_error(t.paths, sums, ark3_twist_tolerance * h, v.way);
+    const Swing swing = v.swing_seen = kernel.swing_error(t.paths, sums, v.way);
+    if (!(swing.error > ark3_swing_tolerance * h * std::max(swing.fastest, at_rest))) return;
     const SwingWork work{v.swing[0], v.swing[1], v.swing[2], v.swing[3]};
     kernel.combine(t.paths, stage.weight, sums, nullptr, work.first, v.way);
     kernel.give(t.forces, efforts(swing_impulse.effort, stages, v, h), nullptr, work.first);
@@ -157,11 +156,6 @@ const StageMatrix& part_matrix(Work& w, const Mode& mode, double weight) {
 }
 
 }  // namespace
-
-bool matters(const Swing& swing, double tolerance, double length) noexcept {
-    constexpr double slow = 0.01;  // of the fastest mass
-    return swing.error > tolerance * length * std::max(slow * swing.fastest, at_rest);
-}
 
 void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALTIME {
     const ModelData& m = w.model;

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "plant/forces.h"
-#include "plant/tree_kernels.h"
 
 namespace shiftrig::plant::detail {
 
@@ -11,13 +10,8 @@ namespace shiftrig::plant::detail {
 inline constexpr double ark3_gamma = 1767732205903. / 4055673282236;
 
 // Swings are looked after where the embedded method differs by more than the first, as a share of the way that the
-// faster end of the shaft turns in the step; it differs by 0.0062 (hω)² hΔω, so never where hω is below the second. A step that
-// differs by more than the third is taken in parts.
-inline constexpr double ark3_swing_tolerance = 1e-7, ark3_slow_swing = 2.8e-3, ark3_twist_tolerance = 3e-6;
-
-// Does the swing matter that was looked for with this tolerance in a step of this length? What turns a hundred times slower than the fastest
-// mass, and less, is measured as if it were that fast: a machine that stands need not be followed until it is silent.
-bool matters(const Swing& swing, double tolerance, double length) noexcept;
+// fastest mass turns in the step. It differs by 0.0062 (hω)² hΔω, so never where hω is below the second.
+inline constexpr double ark3_swing_tolerance = 1e-7, ark3_slow_swing = 2.8e-3;
 
 // As advance() of etd3.h: from the settled `begin` to `end_fraction` of the step in the mode; fills end, with forces
 // and internal torques. Of half it knows the time.

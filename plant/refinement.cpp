@@ -12,8 +12,9 @@
 namespace shiftrig::plant::detail {
 namespace {
 
-// Of the largest torque, of the largest speed.
-constexpr double force_tolerance = 2e-5, swing_tolerance = 2e-5, speed_tolerance = 1e-6;
+// Of the largest torque, of the largest speed, of the way that the fastest mass turns.
+constexpr double force_tolerance = 2e-5, swing_tolerance = 2e-5, speed_tolerance = 1e-6,
+                 twist_tolerance = 3e-6;
 constexpr double rounding = 1e-9;  // of the torques in shafts: by so much they differ where nothing swings
 
 // Is this more than so much of the largest torque? That the forces are among these mostly settles it.
@@ -171,7 +172,7 @@ bool swings_between(const Work& w, const Mode& mode) {
     const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
     const Swing& seen = w.scratch.tree.swing_seen;
     const double h = end.at.time - begin.at.time;
-    if (!matters(seen, ark3_twist_tolerance, h)) return false;
+    if (!(seen.error > twist_tolerance * h * std::max(seen.fastest, at_rest))) return false;
     const TreePaths& paths = mode.tree->paths;
     return seen.error * loops.largest(paths.stiffness, paths.groups) >
            rounding * loops.largest(end.groups.passed, paths.groups);

@@ -273,15 +273,15 @@ double middle(const TreePaths& t, const MiddleSums& s, double* speed) SHIFTRIG_R
     return total(sums) + at_heads;
 }
 
-Swing swing_error(const TreePaths& t, const StageSums& s, double share, double* way) SHIFTRIG_REALTIME {
+Swing swing_error(const TreePaths& t, const StageSums& s, double* way) SHIFTRIG_REALTIME {
     const double *q0 = s.speed[0], *q1 = s.speed[1], *q2 = s.speed[2], *q3 = s.speed[3];
     const double* const ways = s.weight_of_way;
     const Lanes w0 = all(s.h * ways[0]), w1 = all(s.h * ways[1]), w2 = all(s.h * ways[2]),
-                w3 = all(s.h * ways[3]), shares = all(share);
+                w3 = all(s.h * ways[3]);
     const int groups = t.groups;
     const double* const inside = t.inside;
-    const auto larger = [](const Lanes& a, const Lanes& b) { return a > b ? a : b; };
-    Lanes errors = {}, speeds = {}, last_speed = {};
+    const auto largest = [](const Lanes& a, const Lanes& b) { return a > b ? a : b; };
+    Lanes errors = {}, speeds = {};
     Swing swing;
     along_paths(
         t,
@@ -293,17 +293,13 @@ Swing swing_error(const TreePaths& t, const StageSums& s, double share, double* 
         },
         [&](int g, const Lanes& turned, const Lanes& twisted) {
             write(way + g, turned);
-            const Lanes speed = where(first_of(groups - g), magnitude(read(q3 + g)));
-            const Lanes error = where(read(inside + g) > 0., magnitude(twisted));
-            const Marks matters = error > shares * larger(speed, one_before(last_speed, speed));
-            errors = larger(where(first_of(groups - g) & matters, error), errors);
-            speeds = larger(speed, speeds);
-            last_speed = speed;
+            const Lanes error = read(inside + g) > 0. ? magnitude(twisted) : Lanes{};
+            errors = largest(where(first_of(groups - g), error), errors);
+            speeds = largest(where(first_of(groups - g), magnitude(read(q3 + g))), speeds);
         },
         [&](int head, int parent) {
-            const double error = __builtin_fabs(way[head] - way[parent]), own = __builtin_fabs(q3[head]),
-                         up = __builtin_fabs(q3[parent]);
-            if (error > share * (own > up ? own : up) && error > swing.error) swing.error = error;
+            const double error = __builtin_fabs(way[head] - way[parent]);
+            swing.error = error > swing.error ? error : swing.error;
         });
     for (int i = 0; i < lanes; ++i) {
         swing.error = errors[i] > swing.error ? errors[i] : swing.error;

@@ -85,13 +85,12 @@ struct MiddleSums {
 };
 using Middle = double (*)(const TreePaths&, const MiddleSums&, double* speed) SHIFTRIG_REALTIME;
 
-// The largest difference e of a twist from that of the embedded method [rad] among those that are more than `share` [s] times the
-// speed of the faster end of their shaft, and the largest speed of all [rad/s].
+// The largest difference e of a twist from that of the embedded method [rad], and the largest speed [rad/s].
 struct Swing {
     double error = 0, fastest = 0;
 };
-// e as the differences of Σ of_way_j q_j; the last speed is that of the end. `way` is working memory.
-using SwingError = Swing (*)(const TreePaths&, const StageSums&, double share, double* way) SHIFTRIG_REALTIME;
+// e as the differences of Σ of_way_j q_j, left in `way`; the last speed is that of the end.
+using SwingError = Swing (*)(const TreePaths&, const StageSums&, double* way) SHIFTRIG_REALTIME;
 
 // Adds factor (S² − S) e to speeds and twists: S = (1 − hγL)⁻¹ of the linear part L is what a stage solves with. Of the momenta
 // and twists e, the latter differences of `way`, work.first has the right-hand side that they give.
