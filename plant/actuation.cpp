@@ -102,6 +102,15 @@ void end_hydraulics(Work& w, int pair, const PistonCourse& piston) noexcept {
     write_hydraulic(at, state);
 }
 
+void move_pistons(Work& w) noexcept {
+    ScratchData& s = w.scratch;
+    const auto& oil = w.model.description.oil;
+    const std::span<PistonCourse> pistons(s.pistons.data(), static_cast<std::size_t>(s.piston_count));
+    sample_valves(w, pistons);
+    advance_pistons(pistons, oil ? oil->pump_flow : 0);
+    for (std::size_t n = 0; n < pistons.size(); ++n) end_hydraulics(w, s.piston_pairs[n], pistons[n]);
+}
+
 bool is_quiet(const Work& w, int pair) noexcept {
     const auto i = static_cast<std::size_t>(pair);
     const PairLaw& law = w.model.pair_laws[i];
@@ -171,11 +180,7 @@ void advance_actuation(Work& w) SHIFTRIG_REALTIME {
     for (const int k : m.hydraulic_pairs) {
         if (!is_quiet(w, k)) begin_hydraulics(w, k);
     }
-    const auto count = static_cast<std::size_t>(s.piston_count);
-    const std::span<PistonCourse> pistons(s.pistons.data(), count);
-    sample_valves(w, pistons);
-    advance_pistons(pistons, m.description.oil ? m.description.oil->pump_flow : 0);
-    for (std::size_t n = 0; n < count; ++n) end_hydraulics(w, s.piston_pairs[n], s.pistons[n]);
+    if (s.piston_count > 0) move_pistons(w);
     for (const int k : m.pedal_pairs) advance_pedal(w, k);
     for (const int k : m.waveform_pairs) {
         if (!w.operators.commands[static_cast<std::size_t>(k)].fixed) let_move(s, k);
