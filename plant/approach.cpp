@@ -77,9 +77,15 @@ Approached approach_margin(Work& w, const Mode& mode, const Crossing& crossing, 
         const double reached = search.place;
         integrate(w, mode, reached);
         const double rest = left(w.scratch.end());
-        const bool found = std::fabs(rest) <= close_enough;
-        if (found || steps == most_steps) return {reached, found};
+        const bool found =
+            std::fabs(rest) <= close_enough && (rest <= 0 || crossing.change != Change::hold);
+        if (found) return {reached};
+        if (steps == most_steps && crossing.change != Change::hold) return {reached, false};
         search.tell(rest, beyond);
+        if (steps < most_steps) continue;
+        // What holds a little later moves nothing: others bear the difference so long.
+        integrate(w, mode, search.high);
+        return {search.high};
     }
 }
 

@@ -192,7 +192,6 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end,
     w.scratch.turned = false;
     Crossing first;
     if (all_hold(w, mode, end) && flanks_hold(w, end)) return first;
-    first = first_to_hold(w, mode, begin, end);
     const auto consider = [&](const Crossing& next) {
         const bool by_time = locates || is_event(next.change) == is_event(first.change);
         if (first.device < 0 || (by_time ? next.theta < first.theta : is_event(next.change))) first = next;
@@ -217,6 +216,16 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end,
                                   margin(w, k, end));
         }
         consider({k, theta, change});
+    }
+    for (int k = 0; mode.wedges && k < m.pairs; ++k) {
+        if (!is_wedged(w, mode, k) || !may_hold(w, mode, k, end)) continue;
+        if (!middle_known) complete_half(w, mode);
+        middle_known = true;
+        Sample& half = w.scratch.half;
+        if (!mode.tree) show(m, mode, half.f - mode.order, half, padded(m.seen));  // asked in another mode
+        const double g0 = wedged_excess(w, mode, k, begin), gm = wedged_excess(w, mode, k, half),
+                     g1 = wedged_excess(w, mode, k, end);
+        consider({k, parabola_root(g0, 4 * gm - 3 * g0 - g1, g1), Change::hold});
     }
     if (!m.backlashes.empty()) {
         const Crossing flank = first_flank(w, begin, end);

@@ -63,7 +63,7 @@ struct Mode {
                   //                   are accelerations
     double* force_torques = nullptr;  // R_f alone              panels, rows + translating × forces
     double* balance = nullptr;  // C_Iᵀ J⁻¹ (M̃ − Ĉ M_R), in torques  panels, rows × (order + forces + rows)
-    StepOperators step;    // for the model's step size
+    StepOperators step;    // for the model's step size; of length 0 until make_ready()
     int ledger_parts = 1;  // into how many parts the ledger divides a step: shafts and dampers are fast
     StepOperators ledger;  // for one of them
     StepOperators* ledger_of_level = nullptr;  // for shorter ones at its beginning (ledger.h)
@@ -190,6 +190,12 @@ struct OperatorsData {
 // The mode of these contact states, from the table or built now.
 Mode& find_mode(const ModelData& model, OperatorsData& operators, const unsigned char* contact,
                 ScratchData& scratch) SHIFTRIG_REALTIME;
+
+// Step operators and ledger, once somebody is to step in the mode: contact states that are only tried never need them.
+void make_ready(const ModelData& model, Mode& mode, ScratchData& scratch) SHIFTRIG_REALTIME;
+inline bool is_ready(const Mode& mode) noexcept {
+    return mode.tree || mode.step.length > 0;
+}
 
 // The hydraulic operators at this oil temperature.
 void at_oil_temperature(const ModelData& model, OperatorsData& operators,

@@ -161,14 +161,17 @@ Mode& find_mode(const ModelData& m, OperatorsData& o, const unsigned char* conta
     } else {
         build_mode(m, *oldest, scratch.workspace, scratch.workspace_index.data());
         std::fill(oldest->family_mobility, oldest->family_mobility + m.meshes, -1.);
-        const double h = m.options.step_size;
-        oldest->step = build_step_operators(m, *oldest, h, oldest->step_memory, scratch.workspace,
-                                            scratch.workspace_index.data());
-        build_ledger(m, *oldest, scratch.workspace, scratch.workspace_index.data());
+        oldest->step.length = 0;
     }
     list_row_links(m, *oldest);
     oldest->wedges = wedges(m, *oldest);
     return found(*oldest);
+}
+
+void make_ready(const ModelData& m, Mode& mode, ScratchData& scratch) SHIFTRIG_REALTIME {
+    mode.step = build_step_operators(m, mode, m.options.step_size, mode.step_memory, scratch.workspace,
+                                     scratch.workspace_index.data());
+    build_ledger(m, mode, scratch.workspace, scratch.workspace_index.data());
 }
 
 void at_oil_temperature(const ModelData& m, OperatorsData& o, double temperature) SHIFTRIG_REALTIME {

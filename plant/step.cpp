@@ -85,6 +85,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         // Advance over what is left, up to the next jump of a law; in halves where that is too much at once.
         const double split = next_split(w, done);
         double until = part_end(done, split, length);
+        if (!is_ready(*mode)) make_ready(m, *mode, s);
         integrate(w, *mode, until);
         while (divides && (is_coarse(w, *mode) || hides_contact(w))) {
             if (length < halvable) {

@@ -19,10 +19,9 @@ double trial_excess(Work& w, int pair, Sample& s) {
     const Mode& mode = find_directions(w, trial, s);
     const bool agrees = w.outputs.certificate.flags == flags && (mode.bound[pair] & shares_load) != 0;
     w.outputs.certificate.flags = flags;
-    const double torque = s.torque[pair], forward = sliding_limit(w.model, pair, 1, s),
-                 backward = sliding_limit(w.model, pair, -1, s);
-    if (!agrees) return std::max(forward, backward);
-    double most = std::max(torque - forward, -torque - backward);
+    const double sense = slip_sign(w.contact[pair]), limit = sliding_limit(w.model, pair, sense, s);
+    if (!agrees) return limit;
+    double most = sense * s.torque[pair] - limit;
     for (int k = 0; k < w.model.pairs; ++k) {
         if (k != pair && trial[k] == locked && (mode.bound[k] & shares_load) != 0)
             most = std::max(most, -static_margin(w, k, s));
@@ -58,19 +57,6 @@ double wedged_excess(Work& w, const Mode& mode, int pair, Sample& s) SHIFTRIG_RE
 bool may_hold(Work& w, const Mode& mode, int pair, Sample& s) SHIFTRIG_REALTIME {
     const double excess = wedged_excess(w, mode, pair, s);
     return excess < -1e-9 * s.sliding[pair] && excess < -1e-11 * torque_scale(w, s);
-}
-
-Crossing first_to_hold(Work& w, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME {
-    Crossing first;
-    if (!mode.wedges) return first;
-    for (int k = 0; k < w.model.pairs; ++k) {
-        if (!is_wedged(w, mode, k) || !may_hold(w, mode, k, end)) continue;
-        const double before = std::max(0., wedged_excess(w, mode, k, begin)),
-                     after = wedged_excess(w, mode, k, end);
-        const double theta = before / (before - after);
-        if (first.device < 0 || theta < first.theta) first = {k, theta, Change::hold};
-    }
-    return first;
 }
 
 }  // namespace shiftrig::plant::detail

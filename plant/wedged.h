@@ -15,13 +15,11 @@ inline bool is_wedged(const Work& work, const Mode& mode, int pair) noexcept {
     return slips(work.contact[pair]) && mode.bound[pair];
 }
 
-// What it would carry at the sample if it were locked, beyond what it passes, or others beyond what they hold [Nm].
+// What it would carry at the sample if it were locked, in the sense in which it pushes and beyond what it passes so, or others
+// beyond what they hold [Nm]. Where the load has turned it locks in any case, and settle() looks further.
 double wedged_excess(Work& work, const Mode& mode, int pair, Sample& sample) SHIFTRIG_REALTIME;
 
 // May it lock at the sample? By more than rounding: what locks now is not to let go at once.
 bool may_hold(Work& work, const Mode& mode, int pair, Sample& sample) SHIFTRIG_REALTIME;
-
-// The first of them that may, within the part just computed; none: its device is −1.
-Crossing first_to_hold(Work& work, const Mode& mode, Sample& begin, Sample& end) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

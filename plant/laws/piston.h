@@ -244,7 +244,7 @@ inline void begin_part(PistonCourse& c, int part, int parts) noexcept {
     if (parts == 1) {
         c.pressure = c.valve;
     } else if (c.is_sampled) {
-        const auto i = static_cast<std::size_t>(2 * part);
+        const auto i = 2 * static_cast<std::size_t>(part);
         c.pressure = {c.samples[i], c.samples[i + 1], c.samples[i + 2]};
     } else {
         c.pressure = {c.valve.begin, c.valve.begin, c.valve.begin};
