@@ -173,7 +173,10 @@ void change_all(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
             give_way(w, k, s);
             changed = true;
         } else if (verdict[k] == closes && !is_closed(k)) {
-            // One that closes may have brought others to rest with it: these are where they were to go.
+            // One that closes may have brought others to rest with it: these are where they were to go. It may have left others
+            // another share.
+            const Mode& now = find_mode(w.model, w.operators, w.contact, w.scratch);
+            if (changed && k < w.model.pairs && is_wedged(w, now, k) && !may_hold(w, now, k, s)) continue;
             close_device(w, k, s);
             contact_forces(w, w.contact, s);
             changed = true;

@@ -90,6 +90,53 @@ TEST(Wedged, AClutchThatClosesSlowlyInARingTearsNothingLoose) {
     for (const double speed : both.forward.state.speeds()) EXPECT_EQ(speed, 0);
 }
 
+// A passes 10 Nm of 60, C the rest. Where the load turns at once A turns with it, and does not go on pushing against it.
+TEST(Wedged, ALoadThatTurnsAtOnceTurnsThePush) {
+    for (const Method method : {Method::etd3, Method::ark3}) {
+        for (const Transition transition : {Transition::localised, Transition::next_step}) {
+            Description d;
+            d.method = method;
+            d.transition = transition;
+            d.masses = {mass("m", 1)};
+            d.clutches = {closed("A", "m", "", 100, 1, ActuationDirect{{}, 0.1}), closed("C", "m", "", 100)};
+            Waveform load = constant(60, -1e300, 0.02);
+            load.pieces.push_back({.from = 0.02, .offset = -60});
+            d.sources = {source("m", load)};
+            Rig rig(d);
+            rig.run(0.015);
+            EXPECT_NEAR(rig.out("clutch.A.torque"), 10, 1e-9);
+            rig.run(0.03);
+            EXPECT_NEAR(rig.out("clutch.A.torque"), -10, 1e-9) << rig.model.engine();
+            EXPECT_NEAR(rig.out("clutch.C.torque"), -50, 1e-9) << rig.model.engine();
+            EXPECT_EQ(rig.state.speeds()[0], 0);
+        }
+    }
+}
+
+// Its capacity dips below its share for less than a step: it lets go once and holds again once.
+TEST(Wedged, ACapacityThatDipsLetsGoAndHoldsOnce) {
+    for (const Method method : {Method::etd3, Method::ark3}) {
+        for (const double frequency : {3.1, 13.7, 30.3}) {
+            for (const double depth : {1e-4, 1e-3, 1e-2}) {
+                Description d;
+                d.method = method;
+                d.masses = {mass("m", 1)};
+                Waveform wave = sine(0.4, frequency);
+                wave.pieces.push_back({.offset = 0.5});
+                d.clutches = {closed("A", "m", "", 100, 1, ActuationDirect{.profile = wave}),
+                              closed("C", "m", "", 100)};
+                d.sources = {source("m", constant(2 * (10 + depth)))};
+                Rig rig(d);
+                rig.run(1);
+                EXPECT_EQ(rig.fall_backs, 0) << rig.model.engine() << ' ' << frequency << ' ' << depth;
+                EXPECT_LE(rig.times(EventKind::lock, "A").size(), std::ceil(frequency) + 1)
+                    << rig.model.engine() << ' ' << frequency << ' ' << depth;
+                EXPECT_EQ(rig.state.speeds()[0], 0);
+            }
+        }
+    }
+}
+
 // Where another one gives way at last, the one that pushed holds what it pushed with: it goes on from there.
 TEST(Wedged, WhatPushesHoldsWhatAnotherOneLeavesIt) {
     Description d = ring(ActuationDirect{.profile = rising(10, 0.02)});
