@@ -77,8 +77,7 @@ Approached approach_margin(Work& w, const Mode& mode, const Crossing& crossing, 
         const double reached = search.place;
         integrate(w, mode, reached);
         const double rest = left(w.scratch.end());
-        const bool found =
-            std::fabs(rest) <= close_enough && (rest <= 0 || crossing.change != Change::hold);
+        const bool found = std::fabs(rest) <= close_enough && (rest <= 0 || crossing.change != Change::hold);
         if (found) return {reached};
         if (steps == most_steps && crossing.change != Change::hold) return {reached, false};
         search.tell(rest, beyond);

@@ -200,7 +200,8 @@ void advance_tree(Work& w, const Mode& mode, double end_fraction) SHIFTRIG_REALT
 
     // The implicit table ends with b: the last stage needs only what its explicit part lacks.
     GroupState& groups = end.groups;
-    kernel.finish(t.paths, matrix.weight, start.twist, v.way, v.speed[stages - 1], groups.speed, groups.twist);
+    kernel.finish(t.paths, matrix.weight, start.twist, v.way, v.speed[stages - 1], groups.speed,
+                  groups.twist);
     kernel.give(t.forces, efforts(lacks.share, stages, v, h), t.inverse_mass, groups.speed);
     v.swing_seen = {};
     if (t.swings) complete_swing(m, t, v, h, matrix, start.net, groups);

@@ -68,7 +68,8 @@ bool some_pair_strained(const Work& w, const Mode& mode, double share, const Sam
 // Is every state good until the end of the part? The usual answer, quickly; a no only sends us to look closely.
 bool all_hold(const Work& w, const Mode& mode, const Sample& end) {
     const ModelData& m = w.model;
-    if (mode.rests || mode.wedges || some_pair_strained(w, mode, 1, end) || !m.kernel.loops.senses_hold(speed_check(w)))
+    if (mode.rests || mode.wedges || some_pair_strained(w, mode, 1, end) ||
+        !m.kernel.loops.senses_hold(speed_check(w)))
         return false;
     const ContactTable& table = w.operators.table;
     const double *const drive = table.drive, *const offset = table.drive_offset,

@@ -194,7 +194,8 @@ bool is_tree_coarse(Work& w, const Mode& mode) {
         m.tree->kernel.spread(t.masses, v.load, m.masses, of_mass);
         return m.kernel.loops.largest(of_mass, m.masses);
     };
-    return swings_between(w, mode) || takes_forces_amiss(w, late, weight * t.liveliness, change, slow_states_amiss(w, weight)) ||
+    return swings_between(w, mode) ||
+           takes_forces_amiss(w, late, weight * t.liveliness, change, slow_states_amiss(w, weight)) ||
            friction_outruns_stages(w, [&](int k) { return tree_answer(t, h, k); });
 }
 

@@ -103,7 +103,8 @@ struct ScratchData {
     std::vector<EngineMode> engine_modes;                                    // at the beginning of the step
     std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
     std::vector<unsigned char> overcome;  // per pair: broke away in the instant being settled,
-    std::vector<unsigned char> eased;     // came to hold what it pushed with: exactly at its limit, as near as that is known
+    std::vector<unsigned char>
+        eased;  // came to hold what it pushed with: exactly at its limit, as near as that is known
     std::vector<signed char> family;
     std::vector<LossAtRest> losses;  // per mesh, for what is told of it
     AlignedDoubles vectors;

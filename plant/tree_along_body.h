@@ -57,7 +57,8 @@ void shaft_torques(const TreePaths& t, const double* speed, const double* twist,
     LinkSums sums(t, torque);
     along_paths(
         t, [=](int g) { return read(speed + g); },
-        [&, stiffness = t.inner_stiffness, damping = t.inner_damping](int g, const Lanes&, const Lanes& change) {
+        [&, stiffness = t.inner_stiffness, damping = t.inner_damping](int g, const Lanes&,
+                                                                      const Lanes& change) {
             write(rate + g, change);
             const Lanes link =
                 SHIFTRIG_BLOCK_FMA(read(stiffness + g), read(twist + g), read(damping + g) * change);
@@ -134,8 +135,8 @@ void combine_speeds(const TreePaths& t, double weight, const StageSums& s, const
     }
     sums.finish();
     take_at_heads(
-        t, weight,
-        [=](int g, int up) { return twisted ? twist[g] + (way[g] - way[up]) : way[g] - way[up]; }, right);
+        t, weight, [=](int g, int up) { return twisted ? twist[g] + (way[g] - way[up]) : way[g] - way[up]; },
+        right);
 }
 
 template <bool twisted>
@@ -327,7 +328,8 @@ void correct(const TreePaths& t, const StageMatrix& stage, const double* way, do
         [](int, int) {});
     sums.finish();
     take_at_heads(
-        t, weight, [=](int g, int up) { return SHIFTRIG_FMA(weight, first[g] - first[up], error[g]); }, second);
+        t, weight, [=](int g, int up) { return SHIFTRIG_FMA(weight, first[g] - first[up], error[g]); },
+        second);
     solve(t, stage, second);
     differences(t, second, work.rate);
     const double* rate = work.rate;

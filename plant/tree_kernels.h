@@ -52,8 +52,8 @@ struct StageSums {
 };
 // And the right-hand side of the stage that follows, momenta − hγ K (twist + differences of the ways), with the weight hγ. No
 // twist: none.
-using Combine = void (*)(const TreePaths&, double weight, const StageSums&, const double* twist, double* right,
-                         double* way) SHIFTRIG_REALTIME;
+using Combine = void (*)(const TreePaths&, double weight, const StageSums&, const double* twist,
+                         double* right, double* way) SHIFTRIG_REALTIME;
 
 // One implicit stage: q of (M + hγ D + (hγ)² K) q = the right-hand side, in its place.
 //

@@ -36,9 +36,8 @@ int step_stride(const ModelData& m) {
 
 void place_matrix(StageMatrix& matrix, Shelf<double>& shelf, int stride) {
     TreeScan &up = matrix.towards_roots, &down = matrix.towards_leaves;
-    for (double** part :
-         {&matrix.inverse, &matrix.lower, &up.by_one, &up.by_two, &up.by_four, &up.from_outside, &down.by_one,
-          &down.by_two, &down.by_four, &down.from_outside})
+    for (double** part : {&matrix.inverse, &matrix.lower, &up.by_one, &up.by_two, &up.by_four,
+                          &up.from_outside, &down.by_one, &down.by_two, &down.by_four, &down.from_outside})
         *part = shelf.take(stride);
 }
 
@@ -76,7 +75,8 @@ TreeSizes place_tree(const ModelData& m, TreeMode& t, const TreeMemory& memory) 
          {&t.group, &t.first, &t.parent, &t.edge, &t.path_begin, &t.path_parent, &t.head, &t.run_begin,
           &t.run_parent, &t.speed_slot, &t.twist_slot, &t.masses.group, &t.shafts.group, &t.up, &t.spent})
         *array = integers.take(n);
-    for (int** array : {&t.masses.in_line, &t.shafts.in_line}) *array = integers.take(n / smallest_tree_block);
+    for (int** array : {&t.masses.in_line, &t.shafts.in_line})
+        *array = integers.take(n / smallest_tree_block);
     t.end_group = integers.take(2 * n);
     t.end_position = integers.take(2 * n);
     t.ground_position = integers.take(grounds);

@@ -72,8 +72,9 @@ TEST(Wedged, TheNextStepRuleAsksAtTheEndsOfSteps) {
 Description ring(Actuation third) {
     Description d;
     d.masses = {mass("m1", 1), mass("m2", 1), mass("m6", 1)};
-    d.clutches = {closed("ground", "m2", "", 100), closed("c3", "m2", "m1", 20, 1.3, ActuationDirect{{}, 0.5}),
-                  closed("c7", "m2", "m6", 4), clutch("c12", "m6", "m1", 4, 1, std::move(third))};
+    d.clutches = {closed("ground", "m2", "", 100),
+                  closed("c3", "m2", "m1", 20, 1.3, ActuationDirect{{}, 0.5}), closed("c7", "m2", "m6", 4),
+                  clutch("c12", "m6", "m1", 4, 1, std::move(third))};
     d.sources = {source("m1", constant(-11.8)), source("m6", constant(-3.9))};
     return d;
 }
