@@ -87,7 +87,9 @@ void begin_hydraulics(Work& w, int pair) noexcept {
 // Where one piston may change its motion, and with it the share of the others, all are looked at more closely.
 void sample_valves(Work& w, std::span<PistonCourse> pistons) noexcept {
     ScratchData& s = w.scratch;
-    if (std::all_of(pistons.begin(), pistons.end(), needs_no_samples)) return;
+    bool needed = false;
+    for (const PistonCourse& piston : pistons) needed = needed || !needs_no_samples(piston);
+    if (!needed) return;
     for (std::size_t n = 0; n < pistons.size(); ++n) {
         if (is_constant(pistons[n].valve)) continue;
         const auto pair = static_cast<std::size_t>(s.piston_pairs[n]);

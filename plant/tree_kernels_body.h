@@ -13,9 +13,10 @@ namespace {
 
 constexpr int lanes = SHIFTRIG_LANES;
 #include "plant/lanes_body.h"
+#include "plant/tree_lanes_body.h"
+// What follows is made of those.
 #include "plant/tree_across_body.h"
 #include "plant/tree_along_body.h"
-#include "plant/tree_lanes_body.h"
 
 constexpr TreeKernel kernel{lanes,       shaft_torques, combine, solve, finish, middle,
                             swing_error, correct,       slips,   give,  spread};

@@ -2,7 +2,7 @@
 
 // As many numbers as a block has of two that stand in line, from this one on.
 template <int first>
-inline Lanes window(const Lanes& a, const Lanes& b) noexcept {
+inline Lanes window(const Lanes& a, const Lanes& b) SHIFTRIG_REALTIME {
 #if SHIFTRIG_LANES == 8
     return __builtin_shufflevector(a, b, first, first + 1, first + 2, first + 3, first + 4, first + 5,
                                    first + 6, first + 7);
@@ -21,11 +21,11 @@ inline Lanes one_behind(const Lanes& here, const Lanes& next) noexcept {
 
 // Shifted by so many; those at the end come round.
 template <int by>
-inline Lanes from_below(const Lanes& v) noexcept {
+inline Lanes from_below(const Lanes& v) SHIFTRIG_REALTIME {
     return window<lanes - by>(v, v);
 }
 template <int by>
-inline Lanes from_above(const Lanes& v) noexcept {
+inline Lanes from_above(const Lanes& v) SHIFTRIG_REALTIME {
     return window<by>(v, v);
 }
 
