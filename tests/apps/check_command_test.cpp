@@ -227,9 +227,10 @@ TEST(CheckCommand, SaysWhichEngineIntegratesTheMachineAndWhy) {
 
 // ---- warnings ------------------------------------------------------------------------------------------
 
-// What is said of a model written into a file.
+// What is said of a model written into a file, each test's its own: they run side by side.
 nlohmann::json checked_text(const std::string& text, std::vector<std::string> options = {}) {
-    const auto path = std::filesystem::temp_directory_path() / "shiftrig_warned.yaml";
+    const std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
+    const auto path = std::filesystem::temp_directory_path() / ("shiftrig_" + test + ".yaml");
     std::ofstream(path) << text;
     options.insert(options.begin(), {path.string(), "--json"});
     const Said said = check(options);
