@@ -121,9 +121,19 @@ double tree_answer(const TreeMode& t, double length, int k) {
 // torque in the machine to tell much from little by.
 constexpr double creeping = 50;
 
+bool only_creeps(const Work& w, int shaft, double missed) {
+    const ModelData& m = w.model;
+    const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
+    const auto e = static_cast<std::size_t>(shaft);
+    const double damping = m.swing_damping[e], h = end.at.time - begin.at.time;
+    if (!(damping > creeping * m.structure.shafts[e].stiffness * h)) return false;
+    const double from = slip_fast(m.shaft_rate[e], begin.z), to = slip_fast(m.shaft_rate[e], end.z);
+    return missed <= swing_tolerance * damping * std::max(std::fabs(from), std::fabs(to));
+}
+
 // Twists (the last coordinates, just before f) half way, exact and by the cubic through both ends: what lies between does
-// not show at the ends.
-bool hides_swing(const Work& w) {
+// not show at the ends. With those that creep, which mostly settles it, or without.
+bool hides_swing(const Work& w, bool all) {
     const ModelData& m = w.model;
     const Sample &begin = w.scratch.begin(), &half = w.scratch.half, &end = w.scratch.end();
     const double h = end.at.time - begin.at.time;
@@ -131,19 +141,17 @@ bool hides_swing(const Work& w) {
     for (int e = 0; e < m.twists; ++e) {
         const auto& links = m.shaft_rate[static_cast<std::size_t>(e)];
         const int i = m.masses + e;
-        const double from = slip_fast(links, begin.z), to = slip_fast(links, end.z);
-        const double cubic = 0.5 * (begin.z[i] + end.z[i]) + h / 8 * (from - to);
+        const double cubic =
+            0.5 * (begin.z[i] + end.z[i]) + h / 8 * (slip_fast(links, begin.z) - slip_fast(links, end.z));
         const double stiffness = m.structure.shafts[static_cast<std::size_t>(e)].stiffness;
         const double missed = stiffness * std::fabs(half.f[e - m.twists] - cubic);
         strain = std::max(strain, stiffness * std::fabs(end.z[i]));
-        if (!(missed > hidden)) continue;
-        const double damping = m.swing_damping[static_cast<std::size_t>(e)];
-        const bool creeps = damping > creeping * stiffness * h;
-        if (creeps && missed <= swing_tolerance * damping * std::max(std::fabs(from), std::fabs(to)))
-            continue;
-        hidden = missed;
+        if (all || !only_creeps(w, e, missed)) hidden = std::max(hidden, missed);
     }
     return hidden > rounding * strain && exceeds(w, hidden, swing_tolerance);
+}
+bool hides_swing(const Work& w) {
+    return hides_swing(w, true) && hides_swing(w, false);
 }
 
 bool is_dense_coarse(Work& w, const Mode& mode) {
