@@ -74,8 +74,9 @@ struct Event {
     double torque = 0;
     double capacity = 0;  // [Nm] static, sliding where it engages; what the loss of a mesh at rest allows
     double slip = 0;      // [rad/s]
-    // drive_side: x; flanks: +1 or −1, which one; engines: speed [rad/s]; facings: temperature [°C]; mesh_releases: 1 where it only
-    // passes through rest; untold: how many
+    // lock: 1 where it is pressed from this instant on; break_away: +1 or −1, the sense in which it slips from here on; drive_side:
+    // x; flanks: +1 or −1, which one; engines: speed [rad/s]; facings: temperature [°C]; mesh_releases: 1 where it only passes
+    // through rest; untold: how many
     double value = 0;
     // tie_up: bit i of pair `device` + i, which shares the load; the last bit: so do others further away.
     std::uint64_t members = 0;

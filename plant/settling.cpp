@@ -90,9 +90,9 @@ void open_pair(Work& w, const Mode& mode, int pair, Sample& s) SHIFTRIG_REALTIME
     for (int k = w.model.pairs; k < w.model.first_flank; ++k) {
         if (mode.bound[k] && mesh_of(w, k - w.model.pairs).lossy()) w.contact[k] = stuck;
     }
-    log_event(
-        w, {s.at.time, EventKind::break_away, device_index(pair), s.torque[pair], static_limit(w, pair, s)});
-    w.contact[pair] = slipping(opening_sense(w, pair, s.torque[pair], s));
+    const double sense = opening_sense(w, pair, s.torque[pair], s);
+    log_break_away(w, pair, sense, s);
+    w.contact[pair] = slipping(sense);
     w.scratch.overcome[static_cast<std::size_t>(pair)] = 1;
     contact_forces(w, w.contact, s);
 }

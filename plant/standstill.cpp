@@ -233,10 +233,12 @@ struct Search {
         const bool was = w.contact[k] == closed, is = found[k] == closed;
         if (was == is) return;
         if (pair) {
-            const double limit = was ? static_limit(w, k, s) : s.holding[k];
-            log_event(w, {s.at.time, was ? EventKind::break_away : EventKind::lock, device_index(k),
-                          s.torque[k], limit});
-            if (was) overcome(k) = 1;
+            if (was) {
+                log_break_away(w, k, slip_sign(found[k]), s);
+                overcome(k) = 1;
+            } else {
+                log_event(w, {s.at.time, EventKind::lock, device_index(k), s.torque[k], s.holding[k]});
+            }
         } else if (then.bound[k]) {
             return;  // others hold it: its loss has another share in that
         } else if (was) {

@@ -87,6 +87,16 @@ bool is_told(const Work& w, int device) {
     });
 }
 
+// What was told last of the device in this instant.
+Event* last_told(Work& w, int device, double time) {
+    const int count = std::min(w.outputs.event_count, Outputs::event_capacity);
+    for (int i = count - 1; i >= 0; --i) {
+        Event& event = w.outputs.events[static_cast<std::size_t>(i)];
+        if (event.device == device && event.time == time) return &event;
+    }
+    return nullptr;
+}
+
 }  // namespace
 
 bool log_event(Work& w, const Event& event) SHIFTRIG_REALTIME {
@@ -107,13 +117,28 @@ void log_release(Work& w, int device, double time, const LossAtRest& loss) SHIFT
                 .device = device_index(device),
                 .torque = loss.needed,
                 .capacity = loss.allowed};
-    const int count = std::min(w.outputs.event_count, Outputs::event_capacity);
-    for (int i = count - 1; i >= 0; --i) {
-        Event& earlier = w.outputs.events[static_cast<std::size_t>(i)];
-        if (earlier.device != event.device || earlier.time != time) continue;
-        if (earlier.kind != EventKind::mesh_sticks) break;
+    Event* const last = last_told(w, device, time);
+    if (last && last->kind == EventKind::mesh_sticks) {
         event.value = 1;
-        earlier = event;
+        *last = event;
+        return;
+    }
+    log_event(w, event);
+}
+
+void log_break_away(Work& w, int pair, double sense, const Sample& s) SHIFTRIG_REALTIME {
+    const Event event{.time = s.at.time,
+                      .kind = EventKind::break_away,
+                      .device = device_index(pair),
+                      .torque = s.torque[pair],
+                      .capacity = static_limit(w, pair, s),
+                      .value = sense};
+    Event* const last = last_told(w, pair, event.time);
+    if (last && last->kind == EventKind::lock && last->value == 1) {
+        *last = {.time = event.time,
+                 .kind = EventKind::engage,
+                 .device = event.device,
+                 .capacity = sliding_limit(w.model, pair, sense, s)};
         return;
     }
     log_event(w, event);

@@ -16,6 +16,10 @@ bool log_event(Work& work, const Event& event) SHIFTRIG_REALTIME;
 // A mesh begins to move. If it came to rest in this very instant it only passed through: that is told as one event.
 void log_release(Work& work, int device, double time, const LossAtRest& loss) SHIFTRIG_REALTIME;
 
+// A locked pair begins to slip in this sense. One that only began to be pressed in this very instant held nothing: that is told
+// as its engaging.
+void log_break_away(Work& work, int pair, double sense, const Sample& sample) SHIFTRIG_REALTIME;
+
 // Closings since the last call are told with the torques that they lead to.
 void tell_closings(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 

@@ -20,9 +20,10 @@ void close_device(Work& w, int device, Sample& s) {
     std::copy(before.bound, before.bound + m.contact_bytes, was_bound);
     const auto capacity = [&](int k) { return k < m.pairs ? s.holding[k] : 0.; };
     const auto set = [&](int k) {
+        const double pressed_now = k < m.pairs && w.contact[k] == free_running ? 1 : 0;
         w.contact[k] = k < m.pairs ? static_cast<unsigned char>(locked) : static_cast<unsigned char>(stuck);
         log_event(w, {s.at.time, k < m.pairs ? EventKind::lock : EventKind::mesh_sticks, device_index(k),
-                      s.torque[k], capacity(k), device_slip(w, k, s.z)});
+                      s.torque[k], capacity(k), device_slip(w, k, s.z), pressed_now});
     };
     set(device);
     const Mode& mode = find_mode(m, w.operators, w.contact, w.scratch);

@@ -63,9 +63,12 @@ double* show(const detail::Shown& at, const std::vector<Freewheel>& freewheels,
 std::string in_words(const Freewheel& f, const Event& event) {
     switch (event.kind) {
         case EventKind::break_away:
-            if (is_next_to_overrun(f, event.torque))
-                return format("overruns: torque fell to %.1f Nm, it passes on none beyond a drag of %.1f",
-                              event.torque, f.drag_torque);
+            // It may follow others that go in this instant, and be loaded still.
+            if (blocked_sense(f) * event.value < 0) {
+                const bool loaded = f.drag_torque + blocked_sense(f) * event.torque > 1e-4 * f.rated_torque;
+                return format("overruns: torque %s %.1f Nm, it passes on none beyond a drag of %.1f",
+                              loaded ? "was" : "fell to", event.torque, f.drag_torque);
+            }
             return format("slips overloaded: torque %.1f beyond the rated %.1f Nm", event.torque,
                           f.rated_torque);
         case EventKind::lock:

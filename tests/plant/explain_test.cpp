@@ -57,6 +57,27 @@ TEST(Explain, AStuckMeshIsToldWithWhatItNeedsAndWhatItsLossAllows) {
                   "t=0.6010000 g is driven: torque on its first link 2.7 Nm"}));
 }
 
+// What begins to be pressed at rest can hold nothing in this instant: that is no locking, and no breaking away.
+TEST(Explain, APairThatBeginsToPressAtRestEngagesAndLocksOnceItHoldsItsShare) {
+    Description d;
+    d.name = "held";
+    d.masses = {mass("m", 1)};
+    d.clutches = {
+        clutch("holds", "m", "", 25),
+        clutch("joins", "m", "", 10, 1, ActuationDirect{.profile = {{{.from = 0.01, .slope = 20}}}})};
+    d.clutches[0].initially_locked = true;
+    d.sources = {source("m", constant(8))};
+    Rig rig(d);
+    // Its share is 10/35 of the load, as nominal capacities are: after 11.43 ms.
+    EXPECT_EQ(
+        told(rig, 0.1),
+        (std::vector<std::string>{
+            "t=0.0100000 joins engages: slip 0.000 rad/s, capacity 0.0 Nm",
+            "t=0.0214289 joins locks: slip 0, torque 2.3 of 2.3 Nm static",
+            "t=0.0220000 holds carries 5.7 of 25.0 Nm in the closed loop of holds, joins: how they share "
+            "the torque is not unique"}));
+}
+
 // A pinion that nothing loads turns its power to and fro with every swing; the loaded one is told once a reversal.
 TEST(Explain, AReversalOfPowerIsToldOnceTheMeshIsLoaded) {
     Description d;

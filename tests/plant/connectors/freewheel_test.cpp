@@ -287,6 +287,24 @@ TEST(Freewheel, IsExplainedInWords) {
     EXPECT_NE(lines[2].find("F locks: slip"), std::string::npos) << lines[2];
 }
 
+// 10 Nm through a freewheel and 40 Nm beside it on a brake of 60 Nm, of which 20 are left: the second mass runs away with 20 rad/s²,
+// the first one follows with 10.
+TEST(Freewheel, OneThatIsLetGoUnderLoadIsSaidToHaveBeenLoaded) {
+    Description d;
+    d.masses = {mass("drive", 1), mass("driven", 1)};
+    d.freewheels = {freewheel("F", "drive", "driven", 500)};
+    Waveform fails = constant(1, -1e300, 0.05);
+    fails.pieces.push_back({.from = 0.05, .offset = 1. / 3});
+    d.clutches = {clutch("B", "driven", "", 60, 1, ActuationDirect{.profile = fails})};
+    d.clutches[0].initially_locked = true;
+    d.sources = {source("drive", constant(10)), source("driven", constant(40))};
+    Rig rig(d);
+    rig.run(0.1);
+    ASSERT_FALSE(rig.events.empty());
+    EXPECT_EQ(explain(rig.model, rig.events.back()),
+              "t=0.0500000 F overruns: torque was 10.0 Nm, it passes on none beyond a drag of 0.0");
+}
+
 TEST(Freewheel, StaticsKnowsWhichWayItPasses) {
     Description d = Alternating::description();
     StaticsProblem problem;
