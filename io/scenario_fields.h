@@ -97,9 +97,9 @@ template <class Fields>
 void fields(Fields& f, ExpectedEvent& e) {
     Choices<std::string> kinds;
     for (const char* kind :
-         {"lock", "break_away", "engage", "release", "mesh_sticks", "mesh_releases", "drive_side", "tie_up",
-          "fall_back", "engine_stalls", "engine_starts", "facing_warning", "facing_failure", "flank_closes",
-          "flank_opens", "safe_command"})
+         {"lock", "break_away", "engage", "release", "reverse", "mesh_sticks", "mesh_releases", "drive_side",
+          "tie_up", "fall_back", "engine_stalls", "engine_starts", "facing_warning", "facing_failure",
+          "flank_closes", "flank_opens", "safe_command"})
         kinds.emplace_back(kind, kind);
     f.choice("kind", e.kind, kinds, "of event");
     f.optional_text("device", e.device, "[any]");

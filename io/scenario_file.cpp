@@ -176,7 +176,7 @@ void check_events(const ScenarioFile& scenario, const plant::Model& model) {
                    nearest_hint(event.device, devices));
         std::string told;
         bool tells_it = false;
-        for (int k = 0; k <= static_cast<int>(plant::EventKind::untold); ++k) {
+        for (int k = 0; k <= static_cast<int>(plant::last_event_kind); ++k) {
             const auto kind = static_cast<plant::EventKind>(k);
             if (!plant::tells(model, static_cast<std::size_t>(place - devices.begin()), kind)) continue;
             told += (told.empty() ? "" : ", ") + std::string(name(kind));

@@ -69,17 +69,20 @@ Approached approach_margin(Work& w, const Mode& mode, const Crossing& crossing, 
     // only lock, or let go, again.
     const bool by_itself = acts_by_itself(crossing.change),
                safely = crossing.change == Change::overrun || crossing.change == Change::hold;
+    // One that holds no more than it passes on sliding would slip backwards if it gave way below its limit.
+    const bool gives_way = crossing.change == Change::state && crossing.device < w.model.pairs &&
+                           w.contact[crossing.device] == locked;
     const double close_enough = (by_itself ? 1e-2 : safely ? 1e-3 : 1e-6) * search.size();
-    const double beyond = (by_itself ? 3e-3 : safely ? 3e-4 : 0) * (until - done);
+    const double beyond = (by_itself ? 3e-3 : safely ? 3e-4 : gives_way ? 1e-7 : 0) * (until - done);
     if (!mode.tree) look_ahead(w, mode, search, 1e-7 * search.size(), left);
     search.place = std::min(search.place + beyond, until);
     for (int steps = 1;; ++steps) {
         const double reached = search.place;
         integrate(w, mode, reached);
         const double rest = left(w.scratch.end());
-        const bool found = std::fabs(rest) <= close_enough && (rest <= 0 || crossing.change != Change::hold);
-        if (found) return {reached};
-        if (steps == most_steps && crossing.change != Change::hold) return {reached, false};
+        const bool near = std::fabs(rest) <= close_enough, last = steps == most_steps;
+        if (near && (rest <= 0 || !(gives_way || crossing.change == Change::hold))) return {reached};
+        if (last && crossing.change != Change::hold) return {reached, near};
         search.tell(rest, beyond);
         if (steps < most_steps) continue;
         // What holds a little later moves nothing: others bear the difference so long.

@@ -82,6 +82,8 @@ inline double static_margin(const Work& w, int pair, const Sample& s) noexcept {
 // The sense in which a locked pair would slip at this torque: the limit in that sense is the nearer one. Where both limits
 // are alike, that is the sense of the torque.
 inline double opening_sense(const Work& w, int pair, double torque, const Sample& s) noexcept {
+    if (const signed char onward = w.scratch.onward[static_cast<std::size_t>(pair)]; onward != 0)
+        return onward;
     const double difference = static_limit(w.model, pair, 1, s) - static_limit(w.model, pair, -1, s);
     return 2 * torque < difference ? -1 : 1;
 }

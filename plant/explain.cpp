@@ -53,6 +53,7 @@ bool tells(const Model& model, std::size_t device, EventKind kind) noexcept {
         case EventKind::break_away:
         case EventKind::engage:
         case EventKind::release:
+        case EventKind::reverse:
         case EventKind::tie_up:
             return k < m.pairs;
         case EventKind::mesh_sticks:
@@ -115,8 +116,12 @@ std::string explain(const Model& model, const Event& event) {
                                     : left < -little ? " beyond "
                                                      : " at its limit of ";
             return line + "breaks away: " + torque + amount(event, event.torque) + how +
-                   amount(event, event.capacity) + unit + " static" + (left > little ? " just before" : "");
+                   amount(event, event.capacity) + unit + " static" + (left > little ? " just before" : "") +
+                   (event.value == 0 ? ", and slides on where others hold it" : "");
         }
+        case EventKind::reverse:
+            return line + (event.value == 0 ? "pushes" : "slips") + " the other way: " + torque +
+                   amount(event, event.torque) + " of " + amount(event, event.capacity) + unit + " sliding";
         case EventKind::engage:
             return line + format("engages: slip %.3f", event.slip) + speed + ", capacity " +
                    amount(event, event.capacity) + unit;
@@ -125,6 +130,7 @@ std::string explain(const Model& model, const Event& event) {
         case EventKind::mesh_sticks:
             return line + "sticks: rest needs " + rest(event);
         case EventKind::mesh_releases:
+            if (event.value == 2) return line + "moves again, with others that held it";
             return line + (event.value == 0 ? "moves again" : "passes through rest") + ": rest would need " +
                    rest(event);
         case EventKind::drive_side:

@@ -73,7 +73,7 @@ bool engages_or_releases(const Work& w, const Sample& s) {
 void reset(Outputs& outputs, ScratchData& scratch, int forces) {
     outputs.certificate = {};
     outputs.event_count = 0;
-    scratch.told_events = 0;
+    scratch.tells_on = false;
     clear_few(scratch.work, scratch.work + forces);
     scratch.dissipated = scratch.input_work = 0;
     scratch.part_mode = nullptr;

@@ -142,6 +142,7 @@ void build_layout(ModelData& m) {
     at.tie_up = take(1);
     at.loops = take(m.pairs);
     at.drive_sides = take(m.meshes);
+    at.resting = take(m.meshes);
     take(loop_slack);  // read, never written, by loops over what stands before it
     at.size = next;
     for (PairLaw& law : m.pair_laws) {

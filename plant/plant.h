@@ -40,7 +40,7 @@ class ModelError : public std::runtime_error {
 };
 
 enum class EventKind : std::uint8_t {
-    // Friction pairs: closed, opened, free → slipping, no longer pressed.
+    // Friction pairs: closed, opened, free → slipping, no longer pressed; `reverse`, below: slipping the other way.
     lock,
     break_away,
     engage,
@@ -63,7 +63,9 @@ enum class EventKind : std::uint8_t {
     flank_opens,
     // More changes in this step than it can tell.
     untold,
+    reverse,
 };
+constexpr EventKind last_event_kind = EventKind::reverse;
 
 // Why a state changed ([Algin] eq. (12), (13)).
 struct Event {
@@ -74,9 +76,9 @@ struct Event {
     double torque = 0;
     double capacity = 0;  // [Nm] static, sliding where it engages; what the loss of a mesh at rest allows
     double slip = 0;      // [rad/s]
-    // lock: 1 where it is pressed from this instant on; break_away: +1 or −1, the sense in which it slips from here on; drive_side:
-    // x; flanks: +1 or −1, which one; engines: speed [rad/s]; facings: temperature [°C]; mesh_releases: 1 where it only passes
-    // through rest; untold: how many
+    // lock: ±1, the sense in which it slipped until then, 0 where nothing pressed it; break_away, reverse: +1 or −1, the sense in which it slips from here on, 0 where others hold it at rest; drive_side: x; flanks:
+    // +1 or −1, which one; engines: speed [rad/s]; facings: temperature [°C]; mesh_releases: 1 where it only passes through rest, 2
+    // where others held it; untold: how many
     double value = 0;
     // tie_up: bit i of pair `device` + i, which shares the load; the last bit: so do others further away.
     std::uint64_t members = 0;

@@ -56,6 +56,13 @@ struct LossAtRest {
     double needed = 0, allowed = 0;
 };
 
+// What a device did in an instant: closed, with this slip left (a pair); opened, at this torque of what it could hold (a pair), or
+// with this loss needed and allowed (a mesh). Told once the instant is settled.
+struct Note {
+    bool closed = false, opened = false;
+    double slip = 0, torque = 0, capacity = 0;
+};
+
 // The course of what presses a pair together, where it changes within the step.
 struct PairLoad {
     StepValues values;  // engagement
@@ -105,6 +112,8 @@ struct ScratchData {
     std::vector<unsigned char> overcome;  // per pair: broke away in the instant being settled,
     std::vector<unsigned char>
         eased;  // came to hold what it pushed with: exactly at its limit, as near as that is known
+    std::vector<signed char>
+        onward;  // per pair: the sense of its torque from this instant on, where it has none yet
     std::vector<signed char> family;
     std::vector<LossAtRest> losses;  // per mesh, for what is told of it
     AlignedDoubles vectors;
@@ -123,11 +132,15 @@ struct ScratchData {
     std::vector<int> piece;                         // per mass
     AlignedDoubles operator_memory, ledger_memory;  // operators of a partial step, of a part of one
     AlignedDoubles course_memory;                   // of an Interpolant
-    int told_events = 0;                            // so many of this step's events are told in full
-    bool turned = false;                            // power turned round in some mesh within the last part
-    StepOperators used;                             // by the last advance
-    StepOperators part;                             // in operator_memory, for a part of a step
-    const Mode* part_mode = nullptr;                // of this mode, as it was when so many had been built
+    std::vector<Note> notes;                        // per pair and mesh, of the instant being settled
+    std::vector<int> noted;                         // these did something, in this order
+    int noted_count = 0;
+    std::vector<unsigned char> told;  // contact bytes of the instant told last in this step,
+    bool tells_on = false;            // if any was: else those that the step began with
+    bool turned = false;              // power turned round in some mesh within the last part
+    StepOperators used;               // by the last advance
+    StepOperators part;               // in operator_memory, for a part of a step
+    const Mode* part_mode = nullptr;  // of this mode, as it was when so many had been built
     std::int64_t part_modes_built = 0;
     bool carries = false;  // `begin` is as the last advance left it, untouched by a change of state
 };

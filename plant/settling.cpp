@@ -20,20 +20,16 @@ bool engage_and_release(Work& w, Sample& s) {
     for (int k = 0; k < m.pairs; ++k) {
         const bool capable = s.sliding[k] > 0 || s.holding[k] > 0 || is_pressed(w, k, s.at);
         if (capable != (w.contact[k] == free_running)) continue;
-        const double slip = slip_of(pair_links(w, k), s.z);
-        if (!capable && w.contact[k] != free_running) {
-            log_event(w, {s.at.time, EventKind::release, device_index(k), 0, 0,
-                          slip});  // nothing presses it any more
+        changed = true;
+        if (!capable) {
             w.contact[k] = free_running;
-            changed = true;
-        } else if (capable && w.contact[k] == free_running) {
-            if (std::fabs(slip) > at_rest) {
-                log_event(w, {s.at.time, EventKind::engage, device_index(k), 0, s.sliding[k], slip});
-                w.contact[k] = slipping(slip);
-            } else {
-                change_state(w, k, s);
-            }
-            changed = true;
+            continue;
+        }
+        const double slip = slip_of(pair_links(w, k), s.z);
+        if (std::fabs(slip) > at_rest) {
+            w.contact[k] = slipping(slip);
+        } else {
+            change_state(w, k, s);
         }
     }
     if (changed) contact_forces(w, w.contact, s);
@@ -75,6 +71,15 @@ Mode& find_directions(Work& w, unsigned char* contact, Sample& s, bool complete)
     }
 }
 
+Tried try_directions(Work& w, unsigned char* contact, Sample& s) SHIFTRIG_REALTIME {
+    int& flags = w.outputs.certificate.flags;
+    const int kept = std::exchange(flags, 0);
+    Mode& mode = find_directions(w, contact, s);
+    const bool agrees = (flags & 2) == 0;
+    flags = kept;
+    return {mode, agrees};
+}
+
 Use most_used(const Work& w, const unsigned char* contact, const Sample& s,
               const Piece& piece) SHIFTRIG_REALTIME {
     Use worst;
@@ -90,9 +95,8 @@ void open_pair(Work& w, const Mode& mode, int pair, Sample& s) SHIFTRIG_REALTIME
     for (int k = w.model.pairs; k < w.model.first_flank; ++k) {
         if (mode.bound[k] && mesh_of(w, k - w.model.pairs).lossy()) w.contact[k] = stuck;
     }
-    const double sense = opening_sense(w, pair, s.torque[pair], s);
-    log_break_away(w, pair, sense, s);
-    w.contact[pair] = slipping(sense);
+    note_opening(w, pair, s);
+    w.contact[pair] = slipping(opening_sense(w, pair, s.torque[pair], s));
     w.scratch.overcome[static_cast<std::size_t>(pair)] = 1;
     contact_forces(w, w.contact, s);
 }
@@ -116,10 +120,7 @@ bool lean_on_losses(Work& w, const Mode& mode, const Use& most, Sample& s) SHIFT
             trial[k] = moving(direction,
                               w.scratch.torque_copy[static_cast<std::size_t>(k)] * direction < 0 ? -1 : 1);
             contact_forces(w, trial, s);
-            const int flags = std::exchange(w.outputs.certificate.flags, 0);
-            const Mode& leaning = find_directions(w, trial, s);
-            const bool agrees = (w.outputs.certificate.flags & 2) == 0;  // else it is no split of the torques
-            w.outputs.certificate.flags |= flags;
+            const auto [leaning, agrees] = try_directions(w, trial, s);  // else it is no split of the torques
             const double relieved = most_used(w, w.contact, s, piece).share;
             // Not so without a tree: there a loop at rest may be held by torques at the very kink of a mesh's losses, where
             // neither direction agrees and both give nearly the same.
@@ -163,9 +164,10 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
         } else {
             w.outputs.certificate.flags |= 2;
         }
-        if (w.scratch.told_events < w.outputs.event_count) tell_closings(w, mode, s);
+        tell_instant(w, mode, s);
         for (auto* list : {&w.scratch.overcome, &w.scratch.eased})
             std::fill(list->begin(), list->end(), static_cast<unsigned char>(0));
+        std::fill(w.scratch.onward.begin(), w.scratch.onward.end(), static_cast<signed char>(0));
         return mode;
     }
 }

@@ -13,6 +13,13 @@ namespace shiftrig::plant::detail {
 Mode& find_directions(Work& work, unsigned char* contact, Sample& sample,
                       bool complete = false) SHIFTRIG_REALTIME;
 
+// The same for states that are only tried: the certificate does not tell where none agree.
+struct Tried {
+    Mode& mode;
+    bool agrees;
+};
+Tried try_directions(Work& work, unsigned char* contact, Sample& sample) SHIFTRIG_REALTIME;
+
 // The locked pair of the piece that uses most of its static capacity.
 struct Use {
     int pair = -1;

@@ -33,7 +33,7 @@ void set_limits(const Work& w, const Sample& s, RestJoint& joint) {
 bool is_consistent(Work& w, const Piece& piece, unsigned char* contact, bool goes, Sample& s) {
     const ModelData& m = w.model;
     contact_forces(w, contact, s);
-    const Mode& mode = find_directions(w, contact, s);
+    const Mode& mode = try_directions(w, contact, s).mode;
     if (is_overloaded(w, most_used(w, contact, s, piece).pair, s) || loses_too_much(w, mode, s, piece))
         return false;
     sample_rate(w, mode, s);
@@ -155,12 +155,28 @@ struct Search {
         }
         return false;
     }
-    // What does not go shares out its load.
-    bool attempt_shared(Split split) {
-        return solve(split) && attempt([&](int i) {
-                   double share;
-                   return going[i] ? vertex[i] : state_at(i, side_of(rest, i, share));
-               });
+    // What does not go shares out its load; `gently`: and tears no other pair loose.
+    bool attempt_shared(Split split, bool gently) {
+        if (!solve(split)) return false;
+        const auto state = [&](int i) {
+            double share;
+            return going[i] ? vertex[i] : state_at(i, side_of(rest, i, share));
+        };
+        for (int i = 0; gently && i < rest.count; ++i) {
+            const RestJoint& joint = rest.joints[i];
+            if (joint.mesh < 0 && joint.device != gives_way && w.contact[joint.device] == locked &&
+                state(i) != closed)
+                return false;
+        }
+        return attempt(state);
+    }
+    bool attempt_shared() {
+        for (const bool gently : {true, false}) {
+            if (gently && goes) continue;
+            if (attempt_shared(Split::as_modes, gently) || attempt_shared(Split::on_losses, gently))
+                return true;
+        }
+        return false;
     }
     int most_used_of_going() const {
         int most = -1;
@@ -211,41 +227,50 @@ struct Search {
                 break_away(most);
                 continue;
             }
-            if (attempt_least() || attempt_shared(Split::as_modes) || attempt_shared(Split::on_losses))
-                return true;
+            if (attempt_least() || attempt_shared() || attempt_held()) return true;
             if (break_more_away()) continue;
-            if (!breaks_away || overcome(gives_way))
-                return attempt_held() || attempt([&](int i) { return vertex[i]; });
+            if (!breaks_away || overcome(gives_way)) return attempt([&](int i) { return vertex[i]; });
             break_away(giving);  // it is at its limit whatever the split leaves it
         }
     }
 
-    // The one that gave way comes first, what follows from that after it.
-    void tell(const unsigned char* found) {
+    // Notes what was found: the one that gave way comes first, what follows from that after it.
+    void note(const unsigned char* found) {
+        if (goes) find_losses(found);
         const Mode& then = find_mode(w.model, w.operators, found, w.scratch);
-        if (gives_way >= 0) tell(found, then, gives_way);
+        if (gives_way >= 0) note(found, then, gives_way);
         for (int k = 0; k < w.model.first_flank; ++k) {
-            if (k != gives_way) tell(found, then, k);
+            if (k != gives_way) note(found, then, k);
         }
     }
-    void tell(const unsigned char* found, const Mode& then, int k) {
+    void note(const unsigned char* found, const Mode& then, int k) {
         const bool pair = k < w.model.pairs;
         const bool was = w.contact[k] == closed, is = found[k] == closed;
         if (was == is) return;
-        if (pair) {
-            if (was) {
-                log_break_away(w, k, slip_sign(found[k]), s);
-                overcome(k) = 1;
-            } else {
-                log_event(w, {s.at.time, EventKind::lock, device_index(k), s.torque[k], s.holding[k]});
-            }
-        } else if (then.bound[k]) {
-            return;  // others hold it: its loss has another share in that
-        } else if (was) {
-            const LossAtRest loss = loss_at_rest(w, k - w.model.pairs, s);
-            log_release(w, k, s.at.time, loss);
+        if (!pair && then.bound[k]) return;  // others hold it: its loss has another share in that
+        if (is) {
+            note_closing(w, k, 0);
+        } else if (pair) {
+            note_opening(w, k, s);
+            overcome(k) = 1;
         } else {
-            log_event(w, {s.at.time, EventKind::mesh_sticks, device_index(k)});
+            note_release(w, k, w.scratch.losses[static_cast<std::size_t>(k - w.model.pairs)]);
+        }
+    }
+    // Of the meshes that go.
+    void find_losses(const unsigned char* found) {
+        int known = -1;  // whose family's losses are there
+        for (const int k : w.model.lossy_meshes) {
+            const int device = w.model.pairs + k;
+            if (w.contact[device] != stuck || found[device] == stuck) continue;
+            const int leader = leader_of(w, mode, k);
+            LossAtRest* const losses = w.scratch.losses.data();
+            if (leader < 0) {
+                losses[k] = loss_at_rest(w, k, s);
+            } else if (leader != known) {
+                family_losses(w, mode, leader, s, losses);
+                known = leader;
+            }
         }
     }
 };
@@ -272,8 +297,10 @@ Rearrangement rearrange(Work& w, int gives_way, int around, Sample& s, bool amon
         search.forget();
         return Rearrangement::none;
     }
-    search.tell(trial);
-    std::copy(trial, trial + m.contact_bytes, w.contact);
+    unsigned char* const states = w.scratch.changed.data();  // to find what losses there are it tries again
+    std::copy(trial, trial + m.contact_bytes, states);
+    search.note(states);
+    std::copy(states, states + m.contact_bytes, w.contact);
     contact_forces(w, w.contact, s);
     return search.goes ? Rearrangement::moves : Rearrangement::stands;
 }

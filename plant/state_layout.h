@@ -15,6 +15,7 @@
 //   tie-up                1 while a torque split is not unique
 //   loops                 of each friction pair 1 while that is told of it
 //   drive side            of each mesh as last told: x, 0 never
+//   resting               of each mesh 1 while it is told to be stuck
 #pragma once
 
 #include <cstdint>
@@ -29,7 +30,7 @@ struct StateLayout {
     static constexpr int header = 4;
     int speeds = 0, twists = 0, distances = 0, auxiliary = 0, contact = 0, actuators = 0, heat = 0,
         temperatures = 0, energy = 0, engines = 0, sensors = 0, tie_up = 0, loops = 0, drive_sides = 0,
-        size = 0;
+        resting = 0, size = 0;
     int bulk_temperature = 0;  // from a clutch's surface to its bulk
 };
 

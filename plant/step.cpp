@@ -73,7 +73,6 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     // Torque capacities, external torques, internal torques, power-flow directions, internal torques with
     // losses ([Algin] eq. (11), (14), (15), (16)–(25)); what cannot hold at t0+ opens (eq. (12)).
     Mode* mode = &begin_mode(w);
-    if (read_integer(w.state) == 0) tell_resting(w, *mode, s.begin());
 
     double length = 1;             // of a part, at most
     int leans = m.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
@@ -113,6 +112,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         double reached = until;
         if (inside && changes_at_once(w, first, until - done)) {
             reached = done;
+            look_onward(w, first.device);
         } else if (inside && first.theta < 1 - instant) {
             Approached place = approach(w, *mode, first, done, until);
             // An estimate that came too late passed over another change, which goes first; of flanks also what approach()

@@ -117,7 +117,7 @@ double try_departure(Work& w, const Mode& mode, int leader, Sample& s) {
     bool held_together = false;
     const auto attempt = [&](int partner) {
         contact_forces(w, trial, s);
-        const Mode& moving_mode = find_directions(w, trial, s);
+        const Mode& moving_mode = try_directions(w, trial, s).mode;
         held_together = moving_mode.bound[m.pairs + leader] != 0;
         if (held_together || trial[m.pairs + leader] == stuck) return;
         sample_rate(w, moving_mode, s);
@@ -276,7 +276,7 @@ bool leave_to_others(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
             trial[device] = moving(direction, x);
             trial[k] = locked;
             contact_forces(w, trial, s);
-            const Mode& shared = find_directions(w, trial, s);
+            const Mode& shared = try_directions(w, trial, s).mode;
             const double use = most_used(w, trial, s).share;
             if (!shared.bound[device] || use >= least) continue;
             least = use;
@@ -285,7 +285,7 @@ bool leave_to_others(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
         }
         if (taker >= 0) {
             std::copy(w.scratch.release.begin(), w.scratch.release.end(), w.contact);
-            log_event(w, {s.at.time, EventKind::lock, device_index(taker), 0, s.holding[taker]});
+            note_closing(w, taker, 0);
         }
         contact_forces(w, w.contact, s);
         if (taker >= 0) return true;
@@ -317,7 +317,7 @@ bool try_release(Work& w, const Mode& mode, int leader, Sample& s) {
     family_losses(w, mode, leader, s, losses);
     for (const int k : m.lossy_meshes) {
         if (w.contact[m.pairs + k] != stuck || release[m.pairs + k] == stuck) continue;
-        log_release(w, m.pairs + k, s.at.time, losses[k]);
+        note_release(w, m.pairs + k, losses[k]);
     }
     std::copy(release, release + m.contact_bytes, w.contact);
     contact_forces(w, w.contact, s);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "plant/devices.h"
+#include "plant/few.h"
 #include "plant/modes.h"
 #include "plant/wedged.h"
 
@@ -79,23 +80,111 @@ bool some_pushes(const Work& w, const Mode& mode, const Sample& s) {
     return false;
 }
 
-bool is_told(const Work& w, int device) {
-    const int count = std::min(w.outputs.event_count, Outputs::event_capacity);
-    const auto& events = w.outputs.events;
-    return std::any_of(events.begin(), events.begin() + count, [&](const Event& event) {
-        return event.kind == EventKind::mesh_sticks && event.device == device;
-    });
+Note& noted(Work& w, int device) {
+    Note& note = w.scratch.notes[static_cast<std::size_t>(device)];
+    if (!note.closed && !note.opened) {
+        w.scratch.noted[static_cast<std::size_t>(w.scratch.noted_count)] = device;
+        ++w.scratch.noted_count;
+    }
+    return note;
 }
 
-// What was told last of the device in this instant.
-Event* last_told(Work& w, int device, double time) {
-    const int count = std::min(w.outputs.event_count, Outputs::event_capacity);
-    for (int i = count - 1; i >= 0; --i) {
-        Event& event = w.outputs.events[static_cast<std::size_t>(i)];
-        if (event.device == device && event.time == time) return &event;
-    }
-    return nullptr;
+// A pair that locked at this very time, and does not hold, only passed through: says what it was before.
+unsigned char take_back_lock(Work& w, int pair, double time) {
+    Outputs& out = w.outputs;
+    if (out.event_count > Outputs::event_capacity) return locked;
+    const auto end = out.events.begin() + out.event_count;
+    const auto found = std::find_if(out.events.begin(), end, [&](const Event& event) {
+        return event.kind == EventKind::lock && event.device == pair && event.time == time;
+    });
+    if (found == end) return locked;
+    unsigned char was = free_running;
+    if (found->value != 0) was = slipping(found->value);
+    std::move(found + 1, end, found);
+    --out.event_count;
+    return was;
 }
+
+// From what a pair was when the instant began, `was`, to what it is now.
+void tell_pair(Work& w, const Mode& mode, int k, unsigned char was, const Sample& s) {
+    const unsigned char is = w.contact[k];
+    if (was == is) return;
+    if (was == locked) was = take_back_lock(w, k, s.at.time);
+    if (was == is) return;
+    const Note& note = w.scratch.notes[static_cast<std::size_t>(k)];
+    const double sense = mode.bound[k] ? 0 : slip_sign(is);
+    Event event{.time = s.at.time, .device = device_index(k)};
+    if (is == locked) {
+        event.kind = EventKind::lock;
+        event.value = slip_sign(was);
+        event.torque = s.torque[k];
+        event.capacity = s.holding[k];
+        event.slip = note.slip;
+    } else if (is == free_running) {
+        event.kind = EventKind::release;
+        event.slip = device_slip(w, k, s.z);
+    } else if (was == free_running) {
+        event.kind = EventKind::engage;
+        event.capacity = s.sliding[k];
+        event.slip = device_slip(w, k, s.z);
+    } else if (was == locked) {
+        event.kind = EventKind::break_away;
+        event.torque = note.torque;
+        event.capacity = note.capacity;
+        event.value = sense;
+    } else {
+        event.kind = EventKind::reverse;
+        event.capacity = sliding_limit(w.model, k, slip_sign(is), s);
+        event.torque = slip_sign(is) * event.capacity;
+        event.value = sense;
+    }
+    log_event(w, event);
+}
+
+// Of meshes those are told that come to rest by their losses. Others hold them as well, or instead, in between.
+void tell_mesh(Work& w, const Mode& mode, int k, unsigned char was, const LossAtRest& at_rest, Sample& s) {
+    const int device = w.model.pairs + k;
+    const unsigned char is = w.contact[device];
+    const Note& note = w.scratch.notes[static_cast<std::size_t>(device)];
+    double& rests = w.next[w.model.layout.resting + k];
+    Event event{.time = s.at.time, .device = device_index(device)};
+    if (is == stuck) {
+        if (rests != 0) return;
+        rests = 1;
+        event.kind = EventKind::mesh_sticks;
+        event.torque = std::fabs(at_rest.needed);
+        event.capacity = at_rest.allowed;
+    } else {
+        if (mode.bound[device]) return;
+        const bool passes = rests == 0 && note.closed && motion_sign(was) != motion_sign(is);
+        if (rests == 0 && !passes) return;
+        rests = 0;
+        event.kind = EventKind::mesh_releases;
+        event.torque = note.torque;
+        event.capacity = note.capacity;
+        event.value = passes ? 1 : note.torque > note.capacity ? 0 : 2;
+    }
+    log_event(w, event);
+}
+
+// What meshes at rest need and have, each of its motion.
+class Losses {
+  public:
+    Losses(Work& work, const Mode& now) : w(work), mode(now) {}
+    LossAtRest of(int mesh, Sample& s) {
+        const int leader = leader_of(w, mode, mesh);
+        if (leader < 0) return loss_at_rest(w, mesh, s);
+        LossAtRest* const losses = w.scratch.losses.data();
+        if (leader != known) family_losses(w, mode, leader, s, losses);
+        known = leader;
+        return losses[mesh];
+    }
+
+  private:
+    Work& w;
+    const Mode& mode;
+    int known = -1;
+};
 
 }  // namespace
 
@@ -111,65 +200,53 @@ bool log_event(Work& w, const Event& event) SHIFTRIG_REALTIME {
     return false;
 }
 
-void log_release(Work& w, int device, double time, const LossAtRest& loss) SHIFTRIG_REALTIME {
-    Event event{.time = time,
-                .kind = EventKind::mesh_releases,
-                .device = device_index(device),
-                .torque = loss.needed,
-                .capacity = loss.allowed};
-    Event* const last = last_told(w, device, time);
-    if (last && last->kind == EventKind::mesh_sticks) {
-        event.value = 1;
-        *last = event;
-        return;
-    }
-    log_event(w, event);
+void note_closing(Work& w, int device, double slip) SHIFTRIG_REALTIME {
+    Note& note = noted(w, device);
+    note.closed = true;
+    note.slip = slip;
 }
 
-void log_break_away(Work& w, int pair, double sense, const Sample& s) SHIFTRIG_REALTIME {
-    const Event event{.time = s.at.time,
-                      .kind = EventKind::break_away,
-                      .device = device_index(pair),
-                      .torque = s.torque[pair],
-                      .capacity = static_limit(w, pair, s),
-                      .value = sense};
-    Event* const last = last_told(w, pair, event.time);
-    if (last && last->kind == EventKind::lock && last->value == 1) {
-        *last = {.time = event.time,
-                 .kind = EventKind::engage,
-                 .device = event.device,
-                 .capacity = sliding_limit(w.model, pair, sense, s)};
-        return;
-    }
-    log_event(w, event);
+void note_opening(Work& w, int pair, const Sample& s) SHIFTRIG_REALTIME {
+    Note& note = noted(w, pair);
+    note.opened = true;
+    note.torque = s.torque[pair];
+    note.capacity = static_limit(w, pair, s);
 }
 
-void tell_closings(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
-    const int count = std::min(w.outputs.event_count, Outputs::event_capacity);
-    int known = -1;  // whose family's losses are there
-    for (int& i = w.scratch.told_events; i < count; ++i) {
-        Event& event = w.outputs.events[static_cast<std::size_t>(i)];
-        if (event.kind == EventKind::lock) {
-            event.torque = s.torque[event.device];
-        } else if (event.kind == EventKind::mesh_sticks) {
-            const int mesh = event.device - w.model.pairs, leader = leader_of(w, mode, mesh);
-            LossAtRest* const losses = w.scratch.losses.data();
-            if (leader >= 0 && leader != known) family_losses(w, mode, leader, s, losses);
-            if (leader >= 0) known = leader;
-            const LossAtRest loss = leader >= 0 ? losses[mesh] : loss_at_rest(w, mesh, s);
-            event.torque = std::fabs(loss.needed);
-            event.capacity = loss.allowed;
+void note_release(Work& w, int device, const LossAtRest& loss) SHIFTRIG_REALTIME {
+    Note& note = noted(w, device);
+    note.opened = true;
+    note.torque = std::fabs(loss.needed);
+    note.capacity = loss.allowed;
+}
+
+void tell_instant(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
+    if (!w.next) return;  // only looks
+    const ModelData& m = w.model;
+    ScratchData& scratch = w.scratch;
+    unsigned char* const told = scratch.told.data();
+    const bool begins = !scratch.tells_on && read_integer(w.state) == 0;
+    if (!scratch.tells_on) copy_states(scratch.before.data(), m.contact_bytes, told);
+    scratch.tells_on = true;
+    if (!begins && scratch.noted_count == 0 && same_states(told, w.contact, m.contact_bytes)) return;
+
+    Losses losses(w, mode);
+    const auto tell = [&](int k) {
+        if (k < m.pairs) {
+            tell_pair(w, mode, k, told[k], s);
+        } else if (mesh_of(w, k - m.pairs).lossy()) {
+            const bool sticks = w.contact[k] == stuck && w.next[m.layout.resting + k - m.pairs] == 0;
+            tell_mesh(w, mode, k - m.pairs, told[k], sticks ? losses.of(k - m.pairs, s) : LossAtRest{}, s);
         }
-    }
-}
-
-void tell_resting(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
-    for (const int k : w.model.lossy_meshes) {
-        const int device = w.model.pairs + k;
-        if (w.contact[device] != stuck || is_told(w, device)) continue;
-        log_event(w, {.time = s.at.time, .kind = EventKind::mesh_sticks, .device = device_index(device)});
-    }
-    tell_closings(w, mode, s);
+        told[k] = w.contact[k];
+    };
+    // Causes first.
+    for (int i = 0; i < scratch.noted_count; ++i) tell(scratch.noted[static_cast<std::size_t>(i)]);
+    for (int k = 0; k < m.first_flank; ++k) tell(k);
+    for (int i = 0; i < scratch.noted_count; ++i)
+        scratch.notes[static_cast<std::size_t>(scratch.noted[static_cast<std::size_t>(i)])] = {};
+    scratch.noted_count = 0;
+    copy_states(w.contact, m.contact_bytes, told);
 }
 
 void tell_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {

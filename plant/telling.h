@@ -13,18 +13,15 @@ constexpr std::int16_t device_index(int device) noexcept {  // of an event
 // False where the step holds no more events: it is only counted.
 bool log_event(Work& work, const Event& event) SHIFTRIG_REALTIME;
 
-// A mesh begins to move. If it came to rest in this very instant it only passed through: that is told as one event.
-void log_release(Work& work, int device, double time, const LossAtRest& loss) SHIFTRIG_REALTIME;
+// To be told of this instant, once it is settled, if it stands: a pair or mesh came to rest with this slip left; a locked pair gave
+// way; a stuck mesh (a contact byte) moves, since its rest needs more than its losses allow.
+void note_closing(Work& work, int device, double slip) SHIFTRIG_REALTIME;
+void note_opening(Work& work, int pair, const Sample& sample) SHIFTRIG_REALTIME;
+void note_release(Work& work, int device, const LossAtRest& loss) SHIFTRIG_REALTIME;
 
-// A locked pair begins to slip in this sense. One that only began to be pressed in this very instant held nothing: that is told
-// as its engaging.
-void log_break_away(Work& work, int pair, double sense, const Sample& sample) SHIFTRIG_REALTIME;
-
-// Closings since the last call are told with the torques that they lead to.
-void tell_closings(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
-
-// Meshes that are at rest when a run begins.
-void tell_resting(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
+// Tells what is otherwise now than it was before this instant, whatever was tried in between. Of the first instant of a run also the
+// meshes that rest in it.
+void tell_instant(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
 // At the end of a step: power that turned round in a mesh, pairs that now share a torque in a closed loop.
 void tell_step(Work& work, const Mode& mode) SHIFTRIG_REALTIME;

@@ -18,12 +18,9 @@ void close_device(Work& w, int device, Sample& s) {
     Mode& before = find_mode(m, w.operators, w.contact, w.scratch);
     unsigned char* was_bound = w.scratch.changed.data();
     std::copy(before.bound, before.bound + m.contact_bytes, was_bound);
-    const auto capacity = [&](int k) { return k < m.pairs ? s.holding[k] : 0.; };
     const auto set = [&](int k) {
-        const double pressed_now = k < m.pairs && w.contact[k] == free_running ? 1 : 0;
         w.contact[k] = k < m.pairs ? static_cast<unsigned char>(locked) : static_cast<unsigned char>(stuck);
-        log_event(w, {s.at.time, k < m.pairs ? EventKind::lock : EventKind::mesh_sticks, device_index(k),
-                      s.torque[k], capacity(k), device_slip(w, k, s.z), pressed_now});
+        note_closing(w, k, device_slip(w, k, s.z));
     };
     set(device);
     const Mode& mode = find_mode(m, w.operators, w.contact, w.scratch);
@@ -132,6 +129,16 @@ bool give_way(Work& w, int pair, Sample& s) {
 }
 
 }  // namespace
+
+void look_onward(Work& w, int device) SHIFTRIG_REALTIME {
+    constexpr double next_to_nothing = 1e-6;  // of what it is at the end
+    const ModelData& m = w.model;
+    if (device >= m.pairs || w.contact[device] != locked) return;
+    if (m.pair_laws[static_cast<std::size_t>(device)].weak_sense != 0) return;  // its limits say which way
+    const double now = w.scratch.begin().torque[device], then = w.scratch.end().torque[device];
+    if (std::fabs(now) <= next_to_nothing * std::fabs(then))
+        w.scratch.onward[static_cast<std::size_t>(device)] = static_cast<signed char>(then < 0 ? -1 : 1);
+}
 
 bool change_state(Work& w, int device, Sample& s) SHIFTRIG_REALTIME {
     if (device >= w.model.first_flank) {

@@ -63,6 +63,9 @@ bool violated(const Work& work, const Mode& mode, int device, const Sample& end)
 double crossing_margin(Work& work, const Mode& mode, const Crossing& crossing,
                        Sample& sample) SHIFTRIG_REALTIME;
 
+// A pair that can hold nothing yet, and carries nothing yet, gives way in the sense of its torque at the end of the part.
+void look_onward(Work& work, int device) SHIFTRIG_REALTIME;
+
 // Changes the state of one device at the sample, and with it of all that its closing brings to rest. False: a mesh at
 // rest takes over what is too much for it, and nothing begins to move.
 bool change_state(Work& work, int device, Sample& sample) SHIFTRIG_REALTIME;

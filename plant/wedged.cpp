@@ -1,7 +1,6 @@
 #include "plant/wedged.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "plant/devices.h"
 #include "plant/settling.h"
@@ -15,12 +14,9 @@ namespace {
 double trial_excess(Work& w, int pair, Sample& s) {
     unsigned char* const trial = w.scratch.trial.data();
     contact_forces(w, trial, s);
-    const int flags = std::exchange(w.outputs.certificate.flags, 0);
-    const Mode& mode = find_directions(w, trial, s);
-    const bool agrees = w.outputs.certificate.flags == 0 && (mode.bound[pair] & shares_load) != 0;
-    w.outputs.certificate.flags = flags;
+    const auto [mode, agrees] = try_directions(w, trial, s);
     const double sense = slip_sign(w.contact[pair]), limit = sliding_limit(w.model, pair, sense, s);
-    if (!agrees) return limit;
+    if (!agrees || (mode.bound[pair] & shares_load) == 0) return limit;
     double most = sense * s.torque[pair] - limit;
     for (int k = 0; k < w.model.pairs; ++k) {
         if (k != pair && trial[k] == locked && (mode.bound[k] & shares_load) != 0)

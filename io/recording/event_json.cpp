@@ -36,7 +36,7 @@ nlohmann::json event_json(const plant::Event& event, const std::string& device,
             json["temperature_degc"] = event.value;
             break;
         case K::mesh_releases:
-            json["passes_through"] = event.value != 0;
+            json["passes_through"] = event.value == 1;
             break;
         case K::untold:
             json["count"] = event.value;

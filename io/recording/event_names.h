@@ -42,6 +42,8 @@ inline std::string_view name(plant::EventKind kind) {
             return "flank_opens";
         case K::untold:
             return "untold";
+        case K::reverse:
+            return "reverse";
     }
     return "unknown";
 }

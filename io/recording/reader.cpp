@@ -304,7 +304,7 @@ bool RecordingReader::Implementation::next(RecordedTick& tick) {
             happened.value = e.value;
             happened.members = std::bit_cast<std::uint64_t>(e.members);
             if (e.device < -1 || e.device >= static_cast<std::int64_t>(manifest.devices.size()) ||
-                e.kind < 0 || e.kind > static_cast<std::int32_t>(plant::EventKind::untold))
+                e.kind < 0 || e.kind > static_cast<std::int32_t>(plant::last_event_kind))
                 return damaged("an event of an unknown device or kind");
             const std::uint64_t named = happened.members & ~(std::uint64_t{1} << plant::most_members);
             if (happened.members != 0 &&

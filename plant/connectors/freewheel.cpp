@@ -62,15 +62,18 @@ double* show(const detail::Shown& at, const std::vector<Freewheel>& freewheels,
 // It locks and lets go by the sense of its torque, not by pressure.
 std::string in_words(const Freewheel& f, const Event& event) {
     switch (event.kind) {
-        case EventKind::break_away:
+        case EventKind::break_away: {
+            const char* const held = event.value == 0 ? ", where others hold it" : "";
+            const bool overruns =
+                event.value == 0 ? is_next_to_overrun(f, event.torque) : blocked_sense(f) * event.value < 0;
+            if (!overruns)
+                return format("slips overloaded: torque %.1f of the rated %.1f Nm%s", event.torque,
+                              f.rated_torque, held);
             // It may follow others that go in this instant, and be loaded still.
-            if (blocked_sense(f) * event.value < 0) {
-                const bool loaded = f.drag_torque + blocked_sense(f) * event.torque > 1e-4 * f.rated_torque;
-                return format("overruns: torque %s %.1f Nm, it passes on none beyond a drag of %.1f",
-                              loaded ? "was" : "fell to", event.torque, f.drag_torque);
-            }
-            return format("slips overloaded: torque %.1f beyond the rated %.1f Nm", event.torque,
-                          f.rated_torque);
+            const bool loaded = f.drag_torque + blocked_sense(f) * event.torque > 1e-4 * f.rated_torque;
+            return format("overruns: torque %s %.1f Nm, it passes on none beyond a drag of %.1f%s",
+                          loaded ? "was" : "fell to", event.torque, f.drag_torque, held);
+        }
         case EventKind::lock:
             return format("locks: slip %.3g, torque %.1f of %.1f Nm rated", event.slip, event.torque,
                           f.rated_torque);

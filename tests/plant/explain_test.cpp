@@ -78,6 +78,91 @@ TEST(Explain, APairThatBeginsToPressAtRestEngagesAndLocksOnceItHoldsItsShare) {
             "the torque is not unique"}));
 }
 
+// 250 Nm s/s against 50: it gives way in the instant in which it is first pressed, in the sense in which the load will pull.
+TEST(Explain, APairThatIsPressedUnderALoadThatGrowsFasterOnlyEngages) {
+    for (const double sense : {1., -1.}) {
+        Description d;
+        d.name = "outgrown";
+        d.masses = {mass("a", 0.6), mass("b", 0.04)};
+        d.clutches = {
+            clutch("K", "a", "b", 50, 1.2, ActuationDirect{.profile = {{{.from = 0.05, .slope = 1}}}})};
+        TorqueSource load = source("b", constant(0));
+        load.waveform.pieces = {{.from = 0.05, .slope = 300 * sense}};
+        d.sources = {load};
+        Rig rig(d);
+        EXPECT_EQ(told(rig, 0.1),
+                  (std::vector<std::string>{"t=0.0500000 K engages: slip 0.000 rad/s, capacity 0.0 Nm"}));
+        const double square = 0.5 * 0.05 * 0.05;
+        EXPECT_NEAR(rig.state.speeds()[0], sense * 50 / 0.6 * square, 1e-9);
+        EXPECT_NEAR(rig.state.speeds()[1], sense * 250 / 0.04 * square, 1e-9);
+        EXPECT_EQ(rig.fall_backs, 0);
+    }
+}
+
+// Driven through no slip by more than it holds, it passes on as much the other way. It neither locks nor breaks away.
+TEST(Explain, ASlipThatChangesItsSenseIsOneEvent) {
+    Description d = driven_to_rest();
+    d.clutches = {clutch("C", "fast", "slow", 100, 1.2)};
+    d.sources = {source("fast", constant(-600))};
+    Rig rig(d);
+    // (600 + 100)/2.6 + 100/1 rad/s² between them; together 166.7 Nm of 120.
+    EXPECT_EQ(told(rig, 1), (std::vector<std::string>{
+                                "t=0.0000000 C engages: slip 188.500 rad/s, capacity 100.0 Nm",
+                                "t=0.5105208 C slips the other way: torque -100.0 of 100.0 Nm sliding"}));
+}
+
+// At rest beside a locked brake a mesh may lean on it; it is told to move when the brake lets go.
+TEST(Explain, AMeshThatABrakeHeldIsToldToMoveAgain) {
+    Description d;
+    d.name = "braked";
+    d.masses = {mass("a", 1), mass("b", 3)};
+    Gear gear;
+    gear.name = "g", gear.a = "a", gear.b = "b", gear.ratio = 2, gear.efficiency = 0.9;
+    d.gears = {gear};
+    d.clutches = {clutch("B", "b", "", 50, 1.2)};
+    d.clutches[0].initially_locked = true;
+    TorqueSource drive = source("a", constant(0));
+    drive.waveform.pieces = {{.from = 0, .slope = 20}};
+    d.sources = {drive};
+    Rig rig(d);
+    // 60 Nm = 2·0.9·20 Nm/s·t
+    EXPECT_EQ(told(rig, 2), (std::vector<std::string>{
+                                "t=0.0000000 g sticks: rest needs 0.0 Nm of its losses, which allow 0.0",
+                                "t=1.6666667 B breaks away: torque 60.0 at its limit of 60.0 Nm static",
+                                "t=1.6666667 g moves again, with others that held it"}));
+}
+
+// Two meshes of one motion, and an axle at rest behind a shaft: each is told with what all the losses of its motion are.
+TEST(Explain, MeshesThatGoTogetherAreToldWithWhatTheirMotionNeeds) {
+    const auto gear = [](const char* name, const char* a, const char* b, double ratio, double efficiency,
+                         double bearing) {
+        Gear g;
+        g.name = name, g.a = a, g.b = b, g.ratio = ratio, g.efficiency = efficiency;
+        g.bearing_torque = bearing;
+        return g;
+    };
+    Description d;
+    d.name = "axle";
+    d.masses = {mass("p1", 0.02), mass("p2", 0.02), mass("o", 0.3), mass("c", 0.1), mass("l", 3)};
+    d.gears = {gear("G1", "p1", "o", 3, 0.97, 0.05), gear("G2", "p2", "o", 2, 0.97, 0.05),
+               gear("AX", "c", "l", 4, 0.95, 1)};
+    Shaft half_shaft;
+    half_shaft.name = "s", half_shaft.a = "o", half_shaft.b = "c";
+    half_shaft.stiffness = 1000, half_shaft.damping = 1;
+    d.shafts = {half_shaft};
+    TorqueSource drive = source("p1", constant(0));
+    drive.waveform.pieces = {{.from = 0.1, .slope = 1}};
+    d.sources = {drive};
+    Rig rig(d);
+    std::vector<std::string> lines = told(rig, 0.2);
+    ASSERT_GE(lines.size(), 2u);
+    lines.erase(lines.begin(), lines.end() - 2);
+    EXPECT_EQ(lines,
+              (std::vector<std::string>{
+                  "t=0.1859137 G1 moves again: rest would need 0.0859 Nm of its losses, which allow 0.0859",
+                  "t=0.1859137 G2 moves again: rest would need 0.129 Nm of its losses, which allow 0.129"}));
+}
+
 // A pinion that nothing loads turns its power to and fro with every swing; the loaded one is told once a reversal.
 TEST(Explain, AReversalOfPowerIsToldOnceTheMeshIsLoaded) {
     Description d;

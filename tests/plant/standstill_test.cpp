@@ -76,7 +76,7 @@ TEST(Standstill, ABrakeHoldsWhatTheLossesOfItsGearLeaveIt) {
     const Both both(d, 0.1);
     both.expect_mirror_images();
     for (const Rig* rig : {&both.forward, &both.backward}) {
-        EXPECT_EQ(rig->times(EventKind::break_away, "c2").size(), 1u);
+        EXPECT_EQ(rig->times(EventKind::reverse, "c2").size(), 1u);
         EXPECT_TRUE(rig->times(EventKind::break_away, "c5").empty());
         EXPECT_EQ(rig->state.speeds()[0], 0);
     }

@@ -1,0 +1,107 @@
+// The instant at which a pair gives way: known as nearly as rounding allows, and what follows must not hang on which side of it.
+#include <cmath>
+#include <numbers>
+
+#include "tests/plant/mirrored.h"
+
+namespace shiftrig::plant {
+namespace {
+
+Clutch held(const char* name, const char* a, const char* b, double sliding, double static_ratio,
+            Actuation actuation = ActuationConstant{}) {
+    Clutch c = clutch(name, a, b, sliding, static_ratio, std::move(actuation));
+    c.initially_locked = true;
+    return c;
+}
+
+Gear gear(const char* name, const char* a, const char* b, double ratio, double efficiency,
+          double backward_efficiency = 0, double bearing_torque = 0) {
+    Gear g;
+    g.name = name, g.a = a, g.b = b, g.ratio = ratio;
+    g.efficiency = efficiency, g.backward_efficiency = backward_efficiency;
+    g.bearing_torque = bearing_torque;
+    return g;
+}
+
+// A clutch of 10 Nm, a gear of η = 0.8 and a brake that holds 8.82 Nm and passes 6.3: no more than 8 Nm ever come to it. Where the
+// clutch gave way a little below its limit it slipped backwards, and the brake was taken to go in its place.
+TEST(Instant, ABrakeWithinItsLimitStaysWhereTheClutchBeforeItSlips) {
+    for (const Method method : {Method::etd3, Method::ark3}) {
+        for (const double frequency : {3.3, 4.1, 5., 5.9, 7.7}) {
+            for (const double h : {5e-4, 1e-3, 2e-3}) {
+                Description d;
+                d.method = method;
+                d.masses = {mass("m0", 0.2), mass("m1", 0.2), mass("m2", 0.2)};
+                d.gears = {gear("g", "m1", "m2", 1, 0.8)};
+                d.clutches = {held("c", "m0", "m1", 10, 1), held("b", "m2", "", 6.3, 1.4)};
+                Waveform load;
+                load.pieces = {{.amplitude = 15, .frequency = frequency}};
+                d.sources = {source("m0", load)};
+                BuildOptions options;
+                options.step_size = h;
+                const Both both(d, 0.3 / frequency, options);
+                both.expect_mirror_images();
+                const std::vector<double> gives_way = both.forward.times(EventKind::break_away, "c");
+                ASSERT_EQ(gives_way.size(), 1u) << frequency << ' ' << h;
+                EXPECT_NEAR(gives_way[0], std::asin(10. / 15) / (2 * std::numbers::pi * frequency), 1e-7);
+                EXPECT_TRUE(both.forward.times(EventKind::break_away, "b").empty()) << frequency << ' ' << h;
+                EXPECT_EQ(both.forward.state.speeds()[2], 0);
+            }
+        }
+    }
+}
+
+// A brake that broke away at rest passes on 3.99 Nm where the other one holds. When that is at its limit too the first one holds
+// again, up to the 4.64 Nm that it can: the same at every length of the step, and with the gear turned round.
+TEST(Instant, ALastHolderAtItsLimitLeavesTheRestToOneThatPushed) {
+    Description d;
+    d.masses = {mass("m0", 1.7237), mass("m1", 0.2436, -9.593)};
+    d.gears = {gear("g0", "m1", "m0", 1.34744, 0.60927, 0.86612, 0.1416)};
+    d.clutches = {clutch("b0", "m1", "", 3.992, 1.164), clutch("b1", "m0", "", 4.1924)};
+    Waveform load;
+    load.pieces = {{.amplitude = 15.48, .frequency = 6.988, .phase_time = 0.03021}};
+    d.sources = {source("m0", load)};
+    for (const double h : {1e-3, 5e-4, 1e-4}) {
+        BuildOptions options;
+        options.step_size = h;
+        const Both both(d, 0.34, options);
+        both.expect_mirror_images();
+        const std::vector<double> gives_way = both.forward.times(EventKind::break_away, "b0");
+        ASSERT_EQ(gives_way.size(), 2u) << h;
+        EXPECT_NEAR(gives_way[1], 0.335735, 1e-6) << h;
+        EXPECT_NEAR(both.forward.times(EventKind::mesh_releases, "g0").back(), 0.335735, 1e-6) << h;
+    }
+}
+
+// Two gears and two brakes at rest behind a shaft. One brake weakens and gives way; the other one can hold what is left, so it does,
+// in whichever order the gears stand.
+TEST(Instant, NoOtherBrakeIsTornLooseThatCouldHold) {
+    for (const bool reversed : {false, true}) {
+        Description d;
+        d.masses = {mass("m0", 0.0561228), mass("m1", 1.98783), mass("m2", 0.150015), mass("m3", 0.862237)};
+        d.gears = {gear("g0", "m0", "m2", 1.97882, 0.68584, 0.702905),
+                   gear("g1", "m0", "m3", -2.13541, 0.809878, 0.696518)};
+        if (reversed) std::swap(d.gears[0], d.gears[1]);
+        Shaft s;
+        s.name = "s0", s.a = "m0", s.b = "m1";
+        s.stiffness = 143.114, s.damping = 0.0622441;
+        d.shafts = {s};
+        Waveform grows = constant(0.97347, -1e300, 0.05778), wave;
+        grows.pieces.push_back({.from = 0.05778, .offset = 0.97347, .slope = 0.24748});
+        wave.pieces = {{.offset = 0.5, .amplitude = 0.45, .frequency = 6.41, .phase_time = 0.1647}};
+        d.clutches = {clutch("b0", "m2", "", 5.99109, 1.02566, ActuationDirect{.profile = grows}),
+                      clutch("b1", "m3", "", 11.7262, 1.21443, ActuationDirect{.profile = wave})};
+        d.sources = {source("m1", constant(19.2511))};
+        const Both both(d, 0.11);
+        both.expect_mirror_images();
+        const Rig& rig = both.forward;
+        ASSERT_EQ(rig.times(EventKind::break_away, "b1").size(), 2u) << reversed;
+        EXPECT_NEAR(rig.times(EventKind::break_away, "b1")[0], 0.0948374, 1e-6) << reversed;
+        EXPECT_EQ(rig.times(EventKind::break_away, "b0").size(), 1u) << reversed;
+        EXPECT_NEAR(rig.times(EventKind::break_away, "b0")[0], 0.0987599, 1e-6) << reversed;
+        EXPECT_NEAR(rig.times(EventKind::mesh_releases, "g0").back(), 0.0999937, 1e-6) << reversed;
+    }
+}
+
+}  // namespace
+}  // namespace shiftrig::plant
