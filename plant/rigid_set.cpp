@@ -148,7 +148,7 @@ std::vector<TieUp> tie_ups(const RigidSet& set, const std::vector<double>& inert
     std::vector<std::vector<int>> loops;
     const auto qr = factor(scaled_columns(set, inertia));
     const auto& order = qr.colsPermutation().indices();
-    const Eigen::MatrixXd r = qr.matrixR();
+    const Eigen::MatrixXd& r = qr.matrixR();
     for (Eigen::Index dependent = qr.rank(); dependent < r.cols(); ++dependent) {
         std::vector<int> members = needed_for(qr, r.col(dependent));
         members.push_back(order[dependent]);
@@ -157,6 +157,7 @@ std::vector<TieUp> tie_ups(const RigidSet& set, const std::vector<double>& inert
     }
     std::sort(loops.begin(), loops.end());
     std::vector<TieUp> result;
+    result.reserve(loops.size());
     for (const std::vector<int>& members : loops) result.push_back(named(set, members));
     return result;
 }
