@@ -19,10 +19,13 @@ struct Column {
 
 struct Change {
     plant::Event event;
-    std::string device;                  // "F2"; empty: the rig's own
+    std::string device;                  // "F2"; empty: of the machine as a whole, or the rig's own
     std::string text;                    // plant::explain(), or the rig's words
     std::string kind{};                  // "lock", "safe_command": as scenarios name it
     std::vector<std::string> members{};  // of a tie-up: who shares the load
+
+    // Else it is the rig's own.
+    bool of_machine() const { return !device.empty() || kind == "untold"; }
 };
 
 struct Run {

@@ -88,8 +88,11 @@ class ModelReader {
 
     void take_gear_paths() {
         for (const auto& path : model_.gear_paths) {
-            for (const auto& device : path.closed)
-                check_name("gear path", path.name, "closed", device, closable_, "a clutch");
+            for (auto device = path.closed.begin(); device != path.closed.end(); ++device) {
+                check_name("gear path", path.name, "closed", *device, closable_, "a clutch");
+                if (std::find(path.closed.begin(), device, *device) != device)
+                    refuse("gear path", path.name, "closed", "closed = " + *device + "; must be named once");
+            }
             file_.description.gear_paths.push_back({path.name, path.closed});
             if (path.lever == 0) continue;
             for (const auto& other : file_.controller.lever)

@@ -38,8 +38,9 @@ int wheel_of(const Description& d, const Structure& s, int mass) {
 void find_ratio(GearVariant& gear) {
     const Description& d = gear.description;
     const Structure s = build_structure(d);
+    gear.tie_ups = tie_ups(rigid_set(d, s, gear.closed, rigid_alone), s.inertia);
+    gear.blocked_by = output_held_by(d, s, gear.closed);
     const RigidSet set = rigid_set(d, s, gear.closed);
-    gear.tie_ups = tie_ups(set, s.inertia);
     const int input = s.mass(d.input_mass), output = s.mass(d.output_mass);
     if (input < 0 || output < 0) return;
     const Eigen::MatrixXd basis = motions(set, s.inertia);
@@ -122,7 +123,8 @@ Eigen::MatrixXd columns_of(const std::vector<Spring>& springs, int masses) {
 }
 
 // Eigenvalues of ṗ = −Gᵀ(K ψ + D ψ̇), ψ̇ = G p − leak ψ with G = A_Eᵀ Q: the damped system.
-std::vector<DampedMode> damped_modes(const Eigen::MatrixXd& g, const std::vector<Spring>& springs) {
+std::vector<DampedMode> damped_modes(const Eigen::MatrixXd& basis, const Eigen::MatrixXd& g,
+                                     const std::vector<Spring>& springs, const std::vector<double>& inertia) {
     const Eigen::Index d = g.cols(), e = g.rows();
     Eigen::VectorXd root(e), damping(e), leak(e);  // twists scaled by √k, so that both halves carry √J
     for (Eigen::Index k = 0; k < e; ++k) {
@@ -141,11 +143,22 @@ std::vector<DampedMode> damped_modes(const Eigen::MatrixXd& g, const std::vector
     a.bottomLeftCorner(e, d) = root.asDiagonal() * g;
     a.bottomRightCorner(e, e) = (-leak).asDiagonal();
     std::vector<DampedMode> result;
-    const Eigen::VectorXcd values = Eigen::EigenSolver<Eigen::MatrixXd>(a, false).eigenvalues();
-    for (const std::complex<double>& value : values) {
-        const double size = std::abs(value);
-        if (value.imag() > 1e-9 * size && size > 1e-6)
-            result.push_back({size / (2 * pi), -value.real() / size});
+    const Eigen::EigenSolver<Eigen::MatrixXd> solver(a);
+    const Eigen::VectorXcd& values = solver.eigenvalues();
+    const double rounding = std::max(1e-6, 1e-12 * values.cwiseAbs().maxCoeff());
+    const Eigen::MatrixXcd vectors = solver.eigenvectors();
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+        const double size = std::abs(values[i]);
+        if (!(values[i].imag() > 1e-6 * size && size > rounding)) continue;
+        DampedMode mode{size / (2 * pi), -values[i].real() / size, {}};
+        const Eigen::VectorXd amplitude = (basis * vectors.col(i).head(d)).cwiseAbs();
+        double kinetic = 0;
+        for (Eigen::Index j = 0; j < amplitude.size(); ++j) {
+            mode.kinetic_share.push_back(inertia[static_cast<std::size_t>(j)] * amplitude[j] * amplitude[j]);
+            kinetic += mode.kinetic_share.back();
+        }
+        for (double& share : mode.kinetic_share) share /= kinetic;
+        result.push_back(std::move(mode));
     }
     std::sort(result.begin(), result.end(),
               [](const auto& a1, const auto& b1) { return a1.frequency < b1.frequency; });
@@ -181,6 +194,26 @@ Mode make_mode(const Eigen::VectorXd& shape, double square, const Eigen::MatrixX
 
 }  // namespace
 
+std::vector<std::string> output_held_by(const Description& d, const Structure& s,
+                                        const std::vector<std::string>& closed, const RigidOptions& options) {
+    std::vector<std::string> names;
+    const int output = s.mass(d.output_mass);
+    if (output < 0) return names;
+    const RigidSet set = rigid_set(d, s, closed, options);
+    const auto holders = held_by(set, s.inertia);
+    std::vector<int> members = holders[static_cast<std::size_t>(output)];
+    if (members.empty()) members = holders[static_cast<std::size_t>(wheel_of(d, s, output))];
+    for (const int k : members) names.push_back(set.members[static_cast<std::size_t>(k)].name);
+    return names;
+}
+
+bool ModalResult::damping_shifts() const noexcept {
+    return !std::equal(modes.begin(), modes.end(), damped.begin(), damped.end(),
+                       [](const Mode& undamped, const DampedMode& mode) {
+                           return std::fabs(mode.frequency / undamped.frequency - 1) <= 0.01;
+                       });
+}
+
 double GearVariant::kmh(double input_rpm) const noexcept {
     return metres_per_radian ? 3.6 * *metres_per_radian * input_rpm * (pi / 30) : 0;
 }
@@ -214,14 +247,7 @@ std::vector<GearVariant> other_states(const Description& description) {
 
 Eigen::MatrixXd swinging_motions(const Description& d, const Structure& s,
                                  const std::vector<std::string>& closed) {
-    RigidOptions rigid;
-    rigid.stiff_shafts = false;
-    rigid.rolling_tyres = false;
-    std::vector<std::string> locked = closed;
-    for (const Clutch& clutch : d.clutches) {
-        if (clutch.radius > 0) locked.push_back(clutch.name);
-    }
-    return motions(rigid_set(d, s, locked, rigid), s.inertia);
+    return motions(rigid_set(d, s, closed, rigid_alone), s.inertia);
 }
 
 ModalResult natural_modes(const Description& d, const std::vector<std::string>& closed,
@@ -247,7 +273,7 @@ ModalResult natural_modes(const Description& d, const std::vector<std::string>& 
                 make_mode(basis * solver.eigenvectors().col(i), squares[i], a, springs, s.inertia));
         }
     }
-    result.damped = damped_modes(g, springs);
+    result.damped = damped_modes(basis, g, springs, s.inertia);
     return result;
 }
 

@@ -33,7 +33,8 @@ struct GearVariant {
     std::optional<double>
         ratio;  // ω_input / ω_output (at a translating output: of its wheel); none: not driven
     std::optional<double> metres_per_radian;  // travel of the driven body per radian of the input, no slip
-    std::vector<TieUp> tie_ups;
+    std::vector<TieUp> tie_ups;               // of what is rigid: shafts share by their stiffness
+    std::vector<std::string> blocked_by;      // devices that keep the output from turning; none: it can
     double kmh(double input_rpm) const noexcept;  // 0 without a body
 };
 
@@ -44,26 +45,36 @@ std::vector<GearVariant> gear_variants(const Description& description);
 // locked) and "all closed", each with every combination of options.
 std::vector<GearVariant> other_states(const Description& description);
 
+// Of the output or of the wheel that carries it, with shafts stiff and tyres that may slip: which devices hold it. None: it can
+// move, or the machine names no output.
+std::vector<std::string> output_held_by(const Description& description, const Structure& structure,
+                                        const std::vector<std::string>& closed,
+                                        const RigidOptions& options = slipping_tyres);
+
 // ---- natural frequencies ----------------------------------------------------------------------------
 
 struct Mode {
     double frequency = 0;               // undamped [Hz]
-    double damping_ratio = 0;           // first order: modal damping / critical, shafts, dampers and tyres
+    double damping_ratio = 0;           // as if damping did not change the shape: modal damping / critical
     std::vector<double> shape;          // speed of every mass; 1 at the mass with the largest kinetic share
     std::vector<double> kinetic_share;  // of every mass in the kinetic energy, sums to 1
     std::vector<std::pair<std::string, double>>
         elastic_share;  // of every shaft and tyre in the potential energy
 };
 
+// Of shafts, dampers and tyres as they are: a strong damper holds what it joins, and another machine swings.
 struct DampedMode {
-    double frequency = 0;      // |λ|/2π [Hz]
-    double damping_ratio = 0;  // −Re λ/|λ|
+    double frequency = 0;               // |λ|/2π [Hz]
+    double damping_ratio = 0;           // −Re λ/|λ|
+    std::vector<double> kinetic_share;  // of every mass, from its amplitude
 };
 
 struct ModalResult {
     int rigid_motions = 0;           // motions without stiffness
-    std::vector<Mode> modes;         // rising frequency
-    std::vector<DampedMode> damped;  // oscillating ones of the damped system, rising frequency
+    std::vector<Mode> modes;         // undamped, rising frequency
+    std::vector<DampedMode> damped;  // those that oscillate, rising frequency
+    // Does somebody who knows the undamped frequencies alone miss something, by more than one per cent?
+    bool damping_shifts() const noexcept;
 };
 
 struct ModalOptions {

@@ -22,6 +22,7 @@ struct LookedAt {
     GearVariant state;
     ModalResult modal;
     std::string label;  // "gear F2/M", "all open"
+    bool is_gear = false;
 };
 
 void warn_of_what_steps_miss(const Model& model, const std::vector<LookedAt>& states,

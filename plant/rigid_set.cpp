@@ -26,6 +26,25 @@ Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(const Eigen::MatrixXd& scaled
     return qr;
 }
 
+// The independent columns that make up Q·rotated, by their places before pivoting.
+std::vector<int> needed_for(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr,
+                            const Eigen::VectorXd& rotated) {
+    const Eigen::Index rank = qr.rank();
+    const Eigen::MatrixXd r = qr.matrixR().topLeftCorner(rank, rank);
+    const Eigen::VectorXd parts = r.triangularView<Eigen::Upper>().solve(rotated.head(rank));
+    std::vector<int> needed;
+    for (Eigen::Index i = 0; i < rank; ++i) {
+        if (std::fabs(parts[i]) > 1e-7) needed.push_back(qr.colsPermutation().indices()[i]);
+    }
+    return needed;
+}
+
+TieUp named(const RigidSet& set, const std::vector<int>& members) {
+    TieUp tie;
+    for (const int k : members) tie.devices.push_back(set.members[static_cast<std::size_t>(k)].name);
+    return tie;
+}
+
 }  // namespace
 
 bool can_be_closed(const FrictionPair& pair) noexcept {
@@ -53,7 +72,7 @@ RigidSet rigid_set(const Description& d, const Structure& s, const std::vector<s
         const FrictionPair& pair = s.pairs[i];
         if (!can_be_closed(pair)) continue;
         const bool named = std::find(closed.begin(), closed.end(), pair.name) != closed.end();
-        if (named || (pair.rolling_contact && options.rolling_tyres)) {
+        if (named || (pair.rolling_contact && options.wheel_contacts)) {
             add(pair.name, RigidSet::Kind::pair, i, {pair.links[0], pair.links[1], Link{}});
         }
     }
@@ -85,6 +104,24 @@ Eigen::MatrixXd motions(const RigidSet& set, const std::vector<double>& inertia)
     return basis;
 }
 
+std::vector<std::vector<int>> held_by(const RigidSet& set, const std::vector<double>& inertia) {
+    std::vector<std::vector<int>> result(inertia.size());
+    if (set.members.empty()) return result;
+    const Eigen::MatrixXd basis = motions(set, inertia);
+    std::optional<Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>> constraints;
+    for (std::size_t j = 0; j < inertia.size(); ++j) {
+        const auto row = static_cast<Eigen::Index>(j);
+        if (basis.row(row).norm() * std::sqrt(inertia[j]) > 1e-9) continue;
+        // Which constraints together say that this mass does not move?
+        if (!constraints) constraints.emplace(scaled_columns(set, inertia));
+        const Eigen::VectorXd parts = constraints->solve(Eigen::VectorXd::Unit(basis.rows(), row));
+        for (int k = 0; k < parts.size(); ++k) {
+            if (std::fabs(parts[k]) > 1e-7) result[j].push_back(k);
+        }
+    }
+    return result;
+}
+
 Eigen::MatrixXd self_stresses(const RigidSet& set, const std::vector<double>& inertia) {
     const Eigen::Index cols = set.columns.cols();
     if (cols == 0) return {};
@@ -107,24 +144,43 @@ Eigen::MatrixXd self_stresses(const RigidSet& set, const std::vector<double>& in
 }
 
 std::vector<TieUp> tie_ups(const RigidSet& set, const std::vector<double>& inertia) {
-    std::vector<TieUp> result;
-    if (set.columns.cols() == 0) return result;
+    if (set.columns.cols() == 0) return {};
+    std::vector<std::vector<int>> loops;
     const auto qr = factor(scaled_columns(set, inertia));
-    const Eigen::Index rank = qr.rank(), cols = set.columns.cols();
     const auto& order = qr.colsPermutation().indices();
-    const Eigen::MatrixXd r = qr.matrixR().topRows(rank).triangularView<Eigen::Upper>();
-    for (Eigen::Index dependent = rank; dependent < cols; ++dependent) {
-        const Eigen::VectorXd parts = r.leftCols(rank).triangularView<Eigen::Upper>().solve(r.col(dependent));
-        std::vector<int> devices{order[dependent]};
-        for (Eigen::Index i = 0; i < rank; ++i) {
-            if (std::fabs(parts[i]) > 1e-7) devices.push_back(order[i]);
-        }
-        std::sort(devices.begin(), devices.end());
-        TieUp tie;
-        for (int k : devices) tie.devices.push_back(set.members[static_cast<std::size_t>(k)].name);
-        result.push_back(tie);
+    const Eigen::MatrixXd& r = qr.matrixR();
+    for (Eigen::Index dependent = qr.rank(); dependent < r.cols(); ++dependent) {
+        std::vector<int> members = needed_for(qr, r.col(dependent));
+        members.push_back(order[dependent]);
+        std::sort(members.begin(), members.end());
+        loops.push_back(std::move(members));
     }
+    std::sort(loops.begin(), loops.end());
+    std::vector<TieUp> result;
+    result.reserve(loops.size());
+    for (const std::vector<int>& members : loops) result.push_back(named(set, members));
     return result;
+}
+
+std::optional<TieUp> loop_through(const RigidSet& set, const std::vector<double>& inertia,
+                                  const std::string& member) {
+    const auto own = std::find_if(set.members.begin(), set.members.end(),
+                                  [&](const RigidSet::Member& other) { return other.name == member; });
+    if (own == set.members.end()) return std::nullopt;
+    const Eigen::Index k = own - set.members.begin(), last = set.columns.cols() - 1;
+    Eigen::MatrixXd others = scaled_columns(set, inertia);
+    const Eigen::VectorXd column = others.col(k);
+    others.middleCols(k, last - k) = others.rightCols(last - k).eval();
+    others.conservativeResize(Eigen::NoChange, last);
+    if (last == 0) return std::nullopt;
+    const auto qr = factor(others);
+    const Eigen::VectorXd rotated = qr.householderQ().adjoint() * column;
+    if (rotated.tail(rotated.size() - qr.rank()).norm() > rank_threshold) return std::nullopt;
+    std::vector<int> members = needed_for(qr, rotated);
+    for (int& other : members) other += other >= k;
+    members.push_back(static_cast<int>(k));
+    std::sort(members.begin(), members.end());
+    return named(set, members);
 }
 
 }  // namespace shiftrig::plant

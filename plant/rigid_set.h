@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,9 +14,15 @@ namespace shiftrig::plant {
 
 // Gears and planetary rows always belong to it, closed clutches, brakes and freewheels as named.
 struct RigidOptions {
-    bool stiff_shafts = true;   // shafts are untwistable, with the play of backlashes taken up
-    bool rolling_tyres = true;  // tyres roll without slip, and wheel contacts are closed
+    bool stiff_shafts = true;    // shafts are untwistable, with the play of backlashes taken up
+    bool rolling_tyres = true;   // tyres roll without slip
+    bool wheel_contacts = true;  // are closed
 };
+// What is rigid in a step: shafts, plays and tyres give.
+inline constexpr RigidOptions rigid_alone{.stiff_shafts = false, .rolling_tyres = false};
+inline constexpr RigidOptions meshes_alone{
+    .stiff_shafts = false, .rolling_tyres = false, .wheel_contacts = false};
+inline constexpr RigidOptions slipping_tyres{.rolling_tyres = false};
 
 struct RigidSet {
     enum class Kind { mesh, pair, shaft, tyre };
@@ -40,6 +47,9 @@ RigidSet rigid_set(const Description& description, const Structure& structure,
 // Zero columns: the set locks everything.
 Eigen::MatrixXd motions(const RigidSet& set, const std::vector<double>& inertia);
 
+// By mass, the members that together keep it from moving; none: it can move.
+std::vector<std::vector<int>> held_by(const RigidSet& set, const std::vector<double>& inertia);
+
 // All torques of the devices that balance on their own: the columns of the result span {M : CM = 0}. None without loops.
 Eigen::MatrixXd self_stresses(const RigidSet& set, const std::vector<double>& inertia);
 
@@ -48,5 +58,8 @@ struct TieUp {
     std::vector<std::string> devices;
 };
 std::vector<TieUp> tie_ups(const RigidSet& set, const std::vector<double>& inertia);
+// The loop that this member closes with the others; none: it is in none.
+std::optional<TieUp> loop_through(const RigidSet& set, const std::vector<double>& inertia,
+                                  const std::string& member);
 
 }  // namespace shiftrig::plant

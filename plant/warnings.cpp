@@ -1,6 +1,5 @@
 #include "plant/warnings.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -20,17 +19,17 @@ std::string joined(const std::vector<std::string>& words) {
 
 std::vector<LookedAt> states_of(const Description& d) {
     std::vector<LookedAt> states;
-    const auto look = [&](GearVariant&& state, const std::string& label) {
+    const auto look = [&](GearVariant&& state, const std::string& label, bool is_gear) {
         ModalResult modal = natural_modes(state.description, state.closed);
-        states.push_back({std::move(state), std::move(modal), label});
+        states.push_back({std::move(state), std::move(modal), label, is_gear});
     };
     for (GearVariant& gear : gear_variants(d)) {
         const std::string label = "gear " + gear.name;
-        look(std::move(gear), label);
+        look(std::move(gear), label, true);
     }
     for (GearVariant& state : other_states(d)) {
         const std::string label = state.name;
-        look(std::move(state), label);
+        look(std::move(state), label, false);
     }
     return states;
 }
@@ -73,24 +72,13 @@ struct Held {
 };
 
 std::vector<Held> held_for_ever(const Description& d, const Structure& s) {
-    RigidOptions meshes_alone;
-    meshes_alone.stiff_shafts = meshes_alone.rolling_tyres = false;
-    const RigidSet set = rigid_set(d, s, {}, meshes_alone);
-    if (set.members.empty()) return {};
-    const Eigen::MatrixXd basis = motions(set, s.inertia);
-    Eigen::MatrixXd columns = set.columns;
-    for (int j = 0; j < s.masses(); ++j) columns.row(j) /= std::sqrt(s.inertia[static_cast<std::size_t>(j)]);
-    for (Eigen::Index k = 0; k < columns.cols(); ++k) columns.col(k).normalize();
-    const auto solver = columns.completeOrthogonalDecomposition();
+    const RigidSet meshes = rigid_set(d, s, {}, meshes_alone);
+    const auto holders = held_by(meshes, s.inertia);
     std::vector<Held> groups;
     for (int j = 0; j < s.masses(); ++j) {
-        if (basis.row(j).norm() * std::sqrt(s.inertia[static_cast<std::size_t>(j)]) > 1e-9) continue;
-        // Which constraints together say that this mass does not move?
-        const Eigen::VectorXd parts = solver.solve(Eigen::VectorXd::Unit(s.masses(), j));
-        Held held{{j}, {}};
-        for (int k = 0; k < parts.size(); ++k) {
-            if (std::fabs(parts[k]) > 1e-7) held.meshes.insert(k);
-        }
+        const std::vector<int>& own = holders[static_cast<std::size_t>(j)];
+        if (own.empty()) continue;
+        Held held{{j}, {own.begin(), own.end()}};
         for (auto other = groups.begin(); other != groups.end();) {
             const bool shared = std::any_of(held.meshes.begin(), held.meshes.end(),
                                             [&](int k) { return other->meshes.count(k) > 0; });
@@ -191,18 +179,25 @@ void warn_of_tie_ups(const LookedAt& at, std::vector<std::string>& warnings) {
                            " is closed twice: the split of torque is not unique");
 }
 
+// What gears and rows hold without any clutch is told of them, once.
+void warn_of_a_blocked_output(const LookedAt& at, std::vector<std::string>& warnings) {
+    const Description& d = at.state.description;
+    if (!at.is_gear || at.state.blocked_by.empty()) return;
+    if (!output_held_by(d, build_structure(d), {}, meshes_alone).empty()) return;
+    warnings.push_back(at.label + ": the output \"" + d.output_mass + "\" is blocked by " +
+                       joined(at.state.blocked_by));
+}
+
 void warn_of_resonances(const LookedAt& at, std::vector<std::string>& warnings) {
     const Description& d = at.state.description;
     const Structure s = build_structure(d);
     for (const Engine& engine : d.engines) {
         const auto mass = static_cast<std::size_t>(s.mass(engine.mass));
         const double order = engine.cylinders / 2.;  // four strokes: each ignites every other revolution
-        for (const Mode& mode : at.modal.modes) {
+        for (const DampedMode& mode : at.modal.damped) {
             const double speed = mode.frequency * 2 * pi / order;
-            const bool damped_away = mode.damping_ratio > 0.5;
-            if (speed < engine.low_idle || speed > engine.high_idle || mode.kinetic_share[mass] < 1e-3 ||
-                damped_away)
-                continue;
+            const bool unmoved = mode.kinetic_share[mass]<1e-3, damped_away = mode.damping_ratio> 0.5;
+            if (speed < engine.low_idle || speed > engine.high_idle || unmoved || damped_away) continue;
             warnings.push_back(
                 at.label +
                 format(": engine order %.3g meets the mode at %.1f Hz at %.0f rpm (damping ratio %.2f)",
@@ -257,6 +252,7 @@ std::vector<std::string> model_warnings(const Model& model) {
     warn_of_what_steps_miss(model, states, warnings);
     warn_of_fast_dampers(model, states, warnings);
     for (const LookedAt& at : states) {
+        warn_of_a_blocked_output(at, warnings);
         warn_of_tie_ups(at, warnings);
         warn_of_resonances(at, warnings);
     }

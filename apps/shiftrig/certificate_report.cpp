@@ -30,17 +30,18 @@ nlohmann::json to_json(const rig::RunCertificate& c, const plant::Description& m
     const bool divides = machine.transition == plant::Transition::localised && machine.maximum_parts > 1;
     if (!divides) ticks["coarse"] = nullptr;
     return {{"torque_residual", c.torque_residual}, {"constraint_violation_rad_s", c.constraint_violation},
-            {"energy_defect_j", c.energy_defect},   {"events", c.events},
+            {"energy_defect_j", c.energy_defect},   {"changes_located", c.events},
             {"fall_backs", c.fall_backs},           {"mode_lookups", c.mode_lookups},
             {"modes_built", c.mode_misses},         {"ticks", ticks}};
 }
 
-std::string describe(const rig::RunCertificate& c, double dissipated) {
+std::string describe(const rig::RunCertificate& c, std::ptrdiff_t told, double dissipated) {
     std::string text = fmt::format(
-        "plant     {} events, {} fall-backs, {} mode look-ups, {} modes built; torque residual {:.1e}, "
+        "plant     {} events told, {} changes located inside steps, {} fall-backs, {} mode look-ups, {} "
+        "modes built; torque residual {:.1e}, "
         "constraints {:.1e} rad/s at most; energy defect {:.2g} J of {:.4g} J lost\n",
-        c.events, c.fall_backs, c.mode_lookups, c.mode_misses, c.torque_residual, c.constraint_violation,
-        c.energy_defect, dissipated);
+        told, c.events, c.fall_backs, c.mode_lookups, c.mode_misses, c.torque_residual,
+        c.constraint_violation, c.energy_defect, dissipated);
     for (std::size_t bit = 0; bit < c.flagged.size(); ++bit) {
         if (c.flagged[bit] > 0)
             text += fmt::format("          in {} of {} ticks {}\n", c.flagged[bit], c.ticks, flags[bit].text);

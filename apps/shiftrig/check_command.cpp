@@ -52,7 +52,8 @@ Command::Run declare_check(CLI::App& app) {
     files.read(app.add_option(
         "MODEL", options->model,
         "model file (YAML); warned of are efficiencies below 0.5, rigid parts and initial speeds that "
-        "contradict one another, what a step cannot resolve, and modes that an engine's main order meets"));
+        "contradict one another, what a step cannot resolve, gears that block their output or share torque "
+        "in no unique way, and modes that an engine's main order meets"));
     app.add_flag("--json", options->json, "print one JSON object");
     app.add_flag("--shapes", options->shapes, "print the mode shapes of every gear and state");
     add_number(app, "--rate-hz", options->rate_hz, {1, 1e5},

@@ -24,6 +24,13 @@ std::vector<double> frequencies(const plant::ModalResult& modal) {
     return result;
 }
 
+json damped_as_json(const plant::ModalResult& modal) {
+    json modes = json::array();
+    for (const auto& mode : modal.damped)
+        modes.push_back({{"frequency_hz", mode.frequency}, {"damping_ratio", mode.damping_ratio}});
+    return modes;
+}
+
 json modes_as_json(const Examination& examination, const plant::ModalResult& modal) {
     json modes = json::array();
     for (const auto& mode : modal.modes) {
@@ -34,7 +41,7 @@ json modes_as_json(const Examination& examination, const plant::ModalResult& mod
         }
         for (const auto& [device, share] : mode.elastic_share) elastic[device] = share;
         modes.push_back({{"frequency_hz", mode.frequency},
-                         {"damping_ratio", mode.damping_ratio},
+                         {"modal_damping_ratio", mode.damping_ratio},
                          {"shape", shape},
                          {"kinetic_share", kinetic},
                          {"elastic_share", elastic}});
@@ -74,12 +81,6 @@ void print_distribution(std::ostream& out, const Examination& examination) {
 }
 
 void print_gears(std::ostream& out, const Examination& examination) {
-    const auto listed = [](const plant::ModalResult& modal) {
-        std::string text;
-        for (const double frequency : frequencies(modal))
-            text += (text.empty() ? "" : "  ") + digits(frequency, 4);
-        return text.empty() ? "none" : text;
-    };
     if (!examination.gears.empty()) {
         out << "\ngears\n";
         TextTable table;
@@ -91,18 +92,43 @@ void print_gears(std::ostream& out, const Examination& examination) {
                        joined(variant.closed, " ")});
         table.print(out);
     }
+}
+
+// A line for each gear and state: its frequencies, each in its own words.
+template <class Modes, class Say>
+std::string listed(const Modes& modes, Say&& say) {
+    std::string text;
+    for (const auto& mode : modes) text += (text.empty() ? "" : "  ") + say(mode);
+    return text.empty() ? "none" : text;
+}
+
+void print_frequencies(std::ostream& out, const Examination& examination) {
+    TextTable undamped, damped;
+    bool shifted = false;
+    const auto row = [&](const Examination::Gear& at) {
+        const std::string name = at.variant.name + "  ";
+        undamped.row({name + listed(at.modal.modes,
+                                    [](const plant::Mode& mode) { return digits(mode.frequency, 4); })});
+        if (!at.modal.damping_shifts()) return;
+        shifted = true;
+        damped.row({name + listed(at.modal.damped, [](const plant::DampedMode& mode) {
+                        return digits(mode.frequency, 4) + " (" + decimals(mode.damping_ratio, 2) + ")";
+                    })});
+    };
+    for (const auto& gear : examination.gears) row(gear);
+    for (const auto& state : examination.states) row(state);
     out << "\nnatural frequencies, undamped, Hz\n";
-    TextTable table;
-    for (const auto& [variant, modal] : examination.gears) table.row({variant.name + "  " + listed(modal)});
-    for (const auto& [state, modal] : examination.states) table.row({state.name + "  " + listed(modal)});
-    table.print(out);
+    undamped.print(out);
+    if (!shifted) return;
+    out << "\nwith damping, where that shifts one by more than 1 %, Hz (damping ratio)\n";
+    damped.print(out);
 }
 
 void print_shapes(std::ostream& out, const Examination& examination, const std::string& name,
                   const plant::ModalResult& modal) {
     out << "\nmode shapes, " << name << " (speed of each mass, 1 where most of the kinetic energy is)\n";
     TextTable table;
-    std::vector<std::string> head{"Hz"}, damping{"damping ratio"};
+    std::vector<std::string> head{"Hz"}, damping{"modal damping ratio"};
     for (const auto& mode : modal.modes) {
         head.push_back(digits(mode.frequency, 4));
         damping.push_back(digits(mode.damping_ratio, 2));
@@ -120,7 +146,6 @@ void print_shapes(std::ostream& out, const Examination& examination, const std::
 std::vector<Examination::TieUp> find_tie_ups(const plant::Description& machine,
                                              const plant::Structure& structure) {
     std::vector<Examination::TieUp> result;
-    const int output = structure.mass(machine.output_mass);
     const auto examine = [&](const std::string& gear, const std::string& with,
                              std::vector<std::string> closed) {
         if (!with.empty()) {
@@ -132,17 +157,13 @@ std::vector<Examination::TieUp> find_tie_ups(const plant::Description& machine,
             });
             closed.push_back(with);
         }
-        const plant::RigidSet set = plant::rigid_set(machine, structure, closed);
-        const Eigen::MatrixXd motions = plant::motions(set, structure.inertia);
-        Examination::TieUp found{gear, with, false, {}};
-        found.blocks =
-            output >= 0 &&
-            (motions.cols() == 0 ||
-             motions.row(output).norm() * std::sqrt(structure.inertia[static_cast<std::size_t>(output)]) <
-                 1e-9);
-        for (const auto& loop : plant::tie_ups(set, structure.inertia))
-            found.loop.insert(found.loop.end(), loop.devices.begin(), loop.devices.end());
-        if (found.blocks || !found.loop.empty()) result.push_back(std::move(found));
+        const auto set = plant::rigid_set(machine, structure, closed, plant::rigid_alone);
+        Examination::TieUp found{gear, with, !plant::output_held_by(machine, structure, closed).empty(), {}};
+        if (with.empty())
+            found.loops = plant::tie_ups(set, structure.inertia);
+        else if (auto loop = plant::loop_through(set, structure.inertia, with))
+            found.loops.push_back(std::move(*loop));
+        if (found.blocks || !found.loops.empty()) result.push_back(std::move(found));
     };
     for (const auto& path : machine.gear_paths) {
         examine(path.name, "", path.closed);
@@ -162,9 +183,9 @@ void print_tie_ups(std::ostream& out, const Examination& examination) {
             if (tie_up.gear != path.name) continue;
             if (tie_up.blocks && tie_up.with.empty()) out << "  " << path.name << " blocks the output\n";
             if (tie_up.blocks && !tie_up.with.empty()) blocking.push_back(tie_up.with);
-            if (!tie_up.loop.empty())
+            for (const auto& loop : tie_up.loops)
                 out << "  " << path.name << (tie_up.with.empty() ? "" : " with " + tie_up.with) << ": "
-                    << joined(tie_up.loop, ", ")
+                    << joined(loop.devices, ", ")
                     << " form a loop, the split of their torques is not unique\n";
         }
         if (!blocking.empty())
@@ -229,31 +250,40 @@ nlohmann::ordered_json as_json(const Examination& examination) {
         gear["kmh_at_1800_rpm"] = drives_a_body ? json(variant.kmh(slow_rpm)) : json();
         gear["kmh_at_2100_rpm"] = drives_a_body ? json(variant.kmh(fast_rpm)) : json();
         gear["modes_hz"] = frequencies(modal);
+        gear["damped_modes"] = damped_as_json(modal);
         gears.push_back(gear);
         modes[variant.name] = modes_as_json(examination, modal);
     }
-    for (const auto& tie_up : examination.tie_ups)
+    for (const auto& tie_up : examination.tie_ups) {
+        json loops = json::array();
+        for (const auto& loop : tie_up.loops) loops.push_back(loop.devices);
         tie_ups.push_back({{"gear", tie_up.gear},
                            {"with", tie_up.with.empty() ? json() : json(tie_up.with)},
                            {"blocks", tie_up.blocks},
-                           {"loop", tie_up.loop}});
+                           {"loops", loops}});
+    }
     for (const auto& [state, modal] : examination.states) {
-        states.push_back({{"name", state.name}, {"closed", state.closed}, {"modes_hz", frequencies(modal)}});
+        states.push_back({{"name", state.name},
+                          {"closed", state.closed},
+                          {"modes_hz", frequencies(modal)},
+                          {"damped_modes", damped_as_json(modal)}});
         modes[state.name] = modes_as_json(examination, modal);
     }
     modes["open"] = modes_as_json(examination, examination.open);
-    return {{"name", examination.machine.name},
-            {"engine", examination.engine},
-            {"engine_reason", examination.engine_reason},
-            {"masses", masses},
-            {"distribution_matrix",
-             {{"masses", examination.masses}, {"devices", examination.devices}, {"values", matrix}}},
-            {"gears", gears},
-            {"open", {{"modes_hz", frequencies(examination.open)}}},
-            {"states", states},
-            {"modes", modes},
-            {"tie_ups", tie_ups},
-            {"warnings", examination.warnings}};
+    return {
+        {"name", examination.machine.name},
+        {"engine", examination.engine},
+        {"engine_reason", examination.engine_reason},
+        {"masses", masses},
+        {"distribution_matrix",
+         {{"masses", examination.masses}, {"devices", examination.devices}, {"values", matrix}}},
+        {"gears", gears},
+        {"open",
+         {{"modes_hz", frequencies(examination.open)}, {"damped_modes", damped_as_json(examination.open)}}},
+        {"states", states},
+        {"modes", modes},
+        {"tie_ups", tie_ups},
+        {"warnings", examination.warnings}};
 }
 
 void print(std::ostream& out, const Examination& examination, bool with_shapes) {
@@ -263,6 +293,7 @@ void print(std::ostream& out, const Examination& examination, bool with_shapes) 
     print_masses(out, examination);
     print_distribution(out, examination);
     print_gears(out, examination);
+    print_frequencies(out, examination);
     if (with_shapes) {
         for (const auto& [variant, modal] : examination.gears)
             print_shapes(out, examination, variant.name, modal);

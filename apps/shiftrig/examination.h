@@ -19,10 +19,10 @@ struct Examination {
     };
     // What happens where one more clutch or brake is closed than a gear path closes.
     struct TieUp {
-        std::string gear;               // path
-        std::string with;               // the one more; empty: the path itself
-        bool blocks = false;            // the output cannot turn
-        std::vector<std::string> loop;  // devices whose torque split is not unique; empty: no loop
+        std::string gear;                 // path
+        std::string with;                 // the one more; empty: the path itself
+        bool blocks = false;              // the output cannot move
+        std::vector<plant::TieUp> loops;  // of the path, or what the one more closes
     };
     plant::Description machine;
     std::string engine, engine_reason;         // how a step is integrated: etd3, ark3; why so

@@ -1,6 +1,7 @@
 // shiftrig run: the rig at work.
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -238,7 +239,7 @@ double dissipated(const rig::Rig& rig) {  // since the machine's start [J]
 }
 
 void print_summary(const rig::Rig& rig, const rig::Session& session, double dissipated_before,
-                   const analysis::Scorecard& scorecard) {
+                   const analysis::Run& run, const analysis::Scorecard& scorecard) {
     const rt::LoopReport& report = session.report();
     const double wall = static_cast<double>(report.ended - report.began) * 1e-9;
     std::printf("%lld ticks, %.6g s simulated in %.3g s (%.3g times real time)\n",
@@ -247,7 +248,9 @@ void print_summary(const rig::Rig& rig, const rig::Session& session, double diss
     std::cout << describe(report) << "rig tick  " << session.rig_time().percentiles() << '\n';
     if (session.command_to_signal().count() > 0)
         std::cout << "command → signal  " << session.command_to_signal().percentiles() << '\n';
-    std::cout << describe(session.certificate(), dissipated(rig) - dissipated_before);
+    const auto told = std::count_if(run.changes.begin(), run.changes.end(),
+                                    [](const analysis::Change& change) { return change.of_machine(); });
+    std::cout << describe(session.certificate(), told, dissipated(rig) - dissipated_before);
     if (!scorecard.shifts.empty()) std::cout << '\n' << analysis::to_text(scorecard);
 }
 
@@ -326,7 +329,7 @@ int run(const RunOptions& options) {
         result["not_granted"] = to_json(refusals);
         std::cout << result.dump() << '\n';
     } else {
-        print_summary(rig, session, dissipated_before, scorecard);
+        print_summary(rig, session, dissipated_before, collected, scorecard);
     }
     return whole && gave_up(report).empty() && session.certificate().is_finite() ? good : failed;
 }

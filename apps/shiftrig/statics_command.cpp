@@ -1,4 +1,5 @@
 // shiftrig statics: internal torque on every link of every device at zero acceleration.
+#include <algorithm>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -6,6 +7,8 @@
 #include "apps/shiftrig/command.h"
 #include "apps/shiftrig/text_table.h"
 #include "io/model_file.h"
+#include "io/nearest.h"
+#include "plant/connectors.h"
 #include "plant/statics.h"
 
 namespace shiftrig::cli {
@@ -121,6 +124,30 @@ void print(const plant::StaticsResult& result, const Options& options) {
     print_summary(result, options.ideal);
 }
 
+// One of the model's names in an option, "--closed C1".
+void require_name(const io::ModelFile& file, const std::string& option, const std::string& name,
+                  const std::vector<std::string>& known, const char* what) {
+    if (std::find(known.begin(), known.end(), name) == known.end())
+        throw CLI::ValidationError(option + " " + name, file.path + " has no " + what + " of this name" +
+                                                            io::nearest_hint(name, known));
+}
+
+void check_names(const io::ModelFile& file, const plant::StaticsProblem& problem) {
+    std::vector<std::string> closable, masses;
+    plant::for_each_connector(file.description, [&](const auto& device) {
+        if (may_be_closed(device)) closable.push_back(device.name);
+    });
+    for (const auto& mass : file.description.masses) masses.push_back(mass.name);
+    for (auto name = problem.closed.begin(); name != problem.closed.end(); ++name) {
+        require_name(file, "--closed", *name, closable, "clutch, brake or freewheel");
+        if (std::find(problem.closed.begin(), name, *name) != name)
+            throw CLI::ValidationError("--closed " + *name, "must be named once");
+    }
+    for (const auto& input : problem.inputs) require_name(file, "--input", input.first, masses, "mass");
+    for (const auto& speed : problem.speeds) require_name(file, "--speed", speed.first, masses, "mass");
+    if (!problem.output.empty()) require_name(file, "--output", problem.output, masses, "mass");
+}
+
 int run(const Options& options) {
     io::ModelFile file = io::read_model(options.model);
     for (const auto& text : options.options) {
@@ -134,12 +161,13 @@ int run(const Options& options) {
     problem.output = options.output;
     problem.ideal = options.ideal;
 
+    check_names(file, problem);
     const auto result = plant::solve_statics(file.description, problem);
     if (options.json)
         std::cout << as_json(result).dump(2) << '\n';
     else
         print(result, options);
-    return good;
+    return result.directions_settled ? good : failed;
 }
 
 Command::Run declare_statics(CLI::App& app) {

@@ -183,8 +183,10 @@ TEST(CheckCommand, ALoopOfClosedDevicesIsNamed) {
     ASSERT_EQ(said.exit_code, 0) << said.err;
     const auto tie_ups = nlohmann::json::parse(said.out).at("tie_ups");
     ASSERT_EQ(tie_ups.size(), 1u);
-    EXPECT_EQ(tie_ups[0],
-              nlohmann::json({{"gear", "one"}, {"with", "B"}, {"blocks", false}, {"loop", {"A", "B"}}}));
+    EXPECT_EQ(tie_ups[0], nlohmann::json({{"gear", "one"},
+                                          {"with", "B"},
+                                          {"blocks", false},
+                                          {"loops", nlohmann::json::parse(R"([["A", "B"]])")}}));
 }
 
 TEST(CheckCommand, EveryShippedModelPasses) {
@@ -228,15 +230,20 @@ TEST(CheckCommand, SaysWhichEngineIntegratesTheMachineAndWhy) {
 // ---- warnings ------------------------------------------------------------------------------------------
 
 // What is said of a model written into a file, each test's its own: they run side by side.
-nlohmann::json checked_text(const std::string& text, std::vector<std::string> options = {}) {
+std::string printed(const std::string& text, std::vector<std::string> options = {}) {
     const std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
     const auto path = std::filesystem::temp_directory_path() / ("shiftrig_" + test + ".yaml");
     std::ofstream(path) << text;
-    options.insert(options.begin(), {path.string(), "--json"});
+    options.insert(options.begin(), path.string());
     const Said said = check(options);
     std::filesystem::remove(path);
     EXPECT_EQ(said.exit_code, 0) << said.err;
-    return nlohmann::json::parse(said.out);
+    return said.out;
+}
+
+nlohmann::json checked_text(const std::string& text, std::vector<std::string> options = {}) {
+    options.push_back("--json");
+    return nlohmann::json::parse(printed(text, options));
 }
 
 TEST(CheckCommand, ShippedModelsWarnOfNothingButResonances) {
@@ -285,6 +292,76 @@ clutches: {K: {a: t, b: housing, dry: {sliding_capacity_nm: 1, static_ratio: 1.2
     EXPECT_EQ(checked_text(text).at("warnings").size(), 1u);
     EXPECT_EQ(checked_text(text, {"--rate-hz", "2500"}).at("warnings").size(), 0u);
     EXPECT_EQ(check({config + "tractor.yaml", "--rate-hz", "0"}).exit_code, 2);
+}
+
+// ---- loops ---------------------------------------------------------------------------------------------
+
+TEST(CheckCommand, LoopsAreListedApartAndThoseOfOneMoreClutchAreItsOwn) {
+    const auto answer = checked_text(R"(name: two loops
+masses: {in: {inertia_kg_m2: 1}, mid: {inertia_kg_m2: 1}, out: {inertia_kg_m2: 1}}
+clutches:
+  A: &pair {a: in, b: mid, dry: {sliding_capacity_nm: 10, static_ratio: 1}, direct: {}}
+  B: *pair
+  C: &other {<<: *pair, a: mid, b: out}
+  D: *other
+  E: *other
+gear_paths: {one: {closed: [A, B, C, D]}}
+input_mass: in
+output_mass: out
+)");
+    const auto& tie_ups = answer.at("tie_ups");
+    ASSERT_EQ(tie_ups.size(), 2u);
+    EXPECT_EQ(tie_ups[0].at("loops"), nlohmann::json::parse(R"([["A", "B"], ["C", "D"]])"));
+    EXPECT_EQ(tie_ups[1].at("with"), "E");
+    ASSERT_EQ(tie_ups[1].at("loops").size(), 1u);
+    const auto loop = tie_ups[1].at("loops")[0].get<std::vector<std::string>>();
+    ASSERT_EQ(loop.size(), 2u);
+    EXPECT_TRUE(loop[0] == "C" || loop[0] == "D");
+    EXPECT_EQ(loop[1], "E");
+    EXPECT_EQ(answer.at("warnings").size(), 2u);
+}
+
+TEST(CheckCommand, ALoopOfShaftsIsNoTieUpAndAClutchOutsideIsNotSaidToCloseIt) {
+    const auto answer = checked_text(R"(name: parallel shafts
+masses: {a: {inertia_kg_m2: 1}, o: {inertia_kg_m2: 3}}
+shafts:
+  s: &shaft {a: a, b: o, stiffness_nm_per_rad: 2000, damping_nm_s_per_rad: 1}
+  t: *shaft
+clutches: {B: {a: o, b: housing, dry: {sliding_capacity_nm: 50, static_ratio: 1.2}, direct: {}}}
+gear_paths: {one: {closed: []}}
+input_mass: a
+output_mass: o
+)");
+    EXPECT_EQ(answer.at("warnings"), nlohmann::json::array());
+    EXPECT_EQ(answer.at("tie_ups"),
+              nlohmann::json(
+                  {{{"gear", "one"}, {"with", "B"}, {"blocks", true}, {"loops", nlohmann::json::array()}}}));
+}
+
+// ---- modes with damping --------------------------------------------------------------------------------
+
+TEST(CheckCommand, DampedModesStandBesideTheUndampedWhereTheyDiffer) {
+    const std::string text = R"(name: held by a damper
+masses: {a: {inertia_kg_m2: 2}, b: {inertia_kg_m2: 0.5}}
+shafts: {s: {a: a, b: b, stiffness_nm_per_rad: 444132, damping_nm_s_per_rad: 1}}
+dampers: {D: {a: b, b: housing, damping_nm_s_per_rad: STRENGTH}}
+)";
+    const auto with = [&](const std::string& strength) {
+        std::string changed = text;
+        return changed.replace(changed.find("STRENGTH"), 8, strength);
+    };
+    const auto open = checked_text(with("20000")).at("open");
+    EXPECT_NEAR(open.at("modes_hz")[0].get<double>(), 167.7, 0.05);
+    ASSERT_EQ(open.at("damped_modes").size(), 1u);
+    EXPECT_NEAR(open.at("damped_modes")[0].at("frequency_hz").get<double>(), 75.0, 0.05);
+    EXPECT_NEAR(open.at("damped_modes")[0].at("damping_ratio").get<double>(), 0.024, 5e-4);
+    const std::string heading = "with damping, where that shifts one by more than 1 %, Hz (damping ratio)\n";
+    const std::string strong = printed(with("20000")), weak = printed(with("2"));
+    EXPECT_NE(strong.find("\nnatural frequencies, undamped, Hz\n  all open  167.7\n\n" + heading +
+                          "  all open  75.02 (0.02)\n"),
+              std::string::npos)
+        << strong;
+    EXPECT_EQ(weak.find(heading), std::string::npos) << weak;
 }
 
 // ---- what is wrong ---------------------------------------------------------------------------------------

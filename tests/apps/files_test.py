@@ -190,7 +190,7 @@ class Outputs(Commands):
             self.assertRegex(done.stderr, r"(?m)^(shiftrig: standard output|-:) cannot be written(: No space left on device)?$", arguments)
 
     def test_a_closed_standard_output_does_not_become_a_file(self):
-        done = subprocess.run(["sh", "-c", '"$0" check "$1" --svg out.svg >&-', SHIFTRIG, TRACTOR], capture_output=True, text=True,
+        done = subprocess.run(["sh", "-c", '"$0" check "$1" --svg out.svg >&-', SHIFTRIG, CONFIG + "/two_mass.yaml"], capture_output=True, text=True,
                               cwd=self.folder)
         self.assertEqual((done.returncode, done.stderr), (2, "shiftrig: standard output cannot be written: Bad file descriptor\n"))
         with open(self.path("out.svg")) as file:

@@ -250,12 +250,14 @@ class Results(InAFolder):
         self.assertLess(certificate["constraint_violation_rad_s"], 1e-10)
         self.assertLess(abs(certificate["energy_defect_j"]), 1)
         self.assertEqual(certificate["fall_backs"], 0)
-        self.assertGreaterEqual(certificate["events"], 2)  # F3 locks, F2 breaks away
+        self.assertGreaterEqual(certificate["changes_located"], 2)  # F3 locks, F2 breaks away
         self.assertGreater(certificate["modes_built"], 2)
         self.assertEqual(certificate["ticks"],
                          {"tie_up": 0, "direction_search_gave_up": 0, "not_finite": 0, "coarse": None, "instant_not_found": 0})  # steps are taken whole
-        text = run("--scenario", SHIFT, "--pace", "free").stdout
-        self.assertIn("plant     %(events)d events, 0 fall-backs, %(mode_lookups)d mode look-ups, %(modes_built)d modes built; "
+        recording = self.path("shift.lcmlog")
+        text = run("--scenario", SHIFT, "--pace", "free", "--record", recording).stdout
+        told = [e for e in json.loads(command("explain", recording, "--json").stdout) if e["device"]]
+        self.assertIn(f"plant     {len(told)} events told, " + "%(changes_located)d changes located inside steps, 0 fall-backs, %(mode_lookups)d mode look-ups, %(modes_built)d modes built; "
                       "torque residual " % certificate, text)
         self.assertNotIn("of 6000 ticks", text)
 
@@ -415,6 +417,36 @@ class Results(InAFolder):
         of_machine = {who: [e for e in events if e["device"]] for who, events in told.items()}
         self.assertGreater(len(of_machine["run"]), 3)
         self.assertEqual(of_machine["run"], of_machine["explain"])
+
+    def explained(self, model, duration, *options):
+        with open(self.path("m.yaml"), "w") as file:
+            json.dump(model, file)
+        done = run(self.path("m.yaml"), "--pace", "free", "--controller", "none", "--duration", duration, "--record", self.path("m.lcmlog"))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return [json.loads(command("explain", self.path("m.lcmlog"), "--json", *more).stdout) for more in ((), *options)]
+
+    def test_what_concerns_a_device_among_others_is_told_of_it(self):
+        brake = {"a": "a", "b": "housing", "dry": {"sliding_capacity_nm": 50, "static_ratio": 1.3}, "direct": {"initial": 1}}
+        model = {"name": "two brakes", "masses": {"a": {"inertia_kg_m2": 1, "initial_speed_rad_s": 20}},
+                 "clutches": {"B1": brake, "B2": {**brake, "dry": {"sliding_capacity_nm": 30, "static_ratio": 1.1}}}}
+        everything, first, second = self.explained(model, "0.4", ("--device", "B1"), ("--device", "B2"))
+        loops = [e for e in everything if e["kind"] == "tie_up"]
+        self.assertEqual([e["members"] for e in loops], [["B1", "B2"]])
+        for device, told in (("B1", first), ("B2", second)):
+            self.assertEqual(told, [e for e in everything if e["device"] == device or e in loops])
+            self.assertGreater(len(told), 1)
+
+    def test_what_a_step_could_not_tell_is_told_of_every_device(self):
+        model = {"name": "many brakes", "masses": {}, "clutches": {}}
+        for i in range(80):
+            model["masses"][f"m{i}"] = {"inertia_kg_m2": 1, "initial_speed_rad_s": 20}
+            model["clutches"][f"C{i}"] = {"a": f"m{i}", "b": "housing", "dry": {"sliding_capacity_nm": 50, "static_ratio": 1},
+                                          "direct": {"initial": 1}}
+        everything, = self.explained(model, "0.01")
+        silent = sorted(model["clutches"].keys() - {e["device"] for e in everything})
+        self.assertEqual(len(silent), 17)
+        told = json.loads(command("explain", self.path("m.lcmlog"), "--json", "--device", silent[0]).stdout)
+        self.assertEqual([(e["kind"], e["device"], e["count"]) for e in told], [("untold", "", 17)])
 
     def test_the_benchs_own_events_are_told_of_the_same_time_whoever_tells_them(self):
         recording, snapshot, table = self.path("run.lcmlog"), self.path("x.snap"), self.path("x.csv")

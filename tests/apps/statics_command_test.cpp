@@ -123,7 +123,19 @@ TEST(StaticsCommand, AnOptionPutsItsRatioInUse) {
 TEST(StaticsCommand, WrongNamesAndNumbersAreOneLineAndCodeTwo) {
     Said said = statics({wt, "--closed", "C1,C9", "--input", "input=1"});
     EXPECT_EQ(said.exit_code, 2);
-    EXPECT_EQ(said.err, "shiftrig: model \"WT gearbox\": closed = \"C9\" is no clutch, brake or freewheel\n");
+    EXPECT_EQ(said.err,
+              "--closed C9: " + wt + " has no clutch, brake or freewheel of this name; nearest: C1\n");
+    said = statics({wt, "--closed", "C1,C3,C1", "--input", "input=1"});
+    EXPECT_EQ(said.exit_code, 2);
+    EXPECT_EQ(said.err, "--closed C1: must be named once\n");
+    for (const std::string option : {"--input", "--speed", "--output"}) {
+        const std::string value = option == "--output" ? "imput" : "imput=1";
+        std::vector<std::string> arguments{wt, "--closed", "C1,C3", option, value};
+        if (option != "--input") arguments.insert(arguments.end(), {"--input", "input=1"});
+        said = statics(arguments);
+        EXPECT_EQ(said.exit_code, 2);
+        EXPECT_EQ(said.err, option + " imput: " + wt + " has no mass of this name; nearest: input\n");
+    }
     said = statics({wt, "--closed", "C1,C3", "--input", "input=one"});
     EXPECT_EQ(said.exit_code, 2);
     EXPECT_EQ(said.err, "--input: \"input=one\": \"one\" is no finite number\n");
@@ -233,6 +245,21 @@ TEST(StaticsCommand, SelfLockingIsSaidAndNoEfficiencyPrinted) {
     EXPECT_TRUE(answer.at("self_locking").get<bool>());
     EXPECT_TRUE(answer.at("efficiency").is_null());
     EXPECT_NEAR(answer.at("loss_w").get<double>(), 300, 1e-9);
+}
+
+// Asked the other way round, the row cannot turn: power put in at the carrier comes out nowhere.
+TEST(StaticsCommand, WhereNoDirectionsAgreeTheCodeIsOne) {
+    const ModelFile model(row_with("0.99", "0.97"));
+    std::vector<std::string> arguments{model.path(), "--closed", "B",       "--input",  "carrier=-100",
+                                       "--output",   "ring",     "--speed", "carrier=1"};
+    const Said said = statics(arguments);
+    EXPECT_EQ(said.exit_code, 1) << said.err;
+    EXPECT_EQ(said.err, "");
+    EXPECT_NE(said.out.find("no consistent directions of power were found"), std::string::npos) << said.out;
+    arguments.push_back("--json");
+    const Said json = statics(arguments);
+    EXPECT_EQ(json.exit_code, 1) << json.err;
+    EXPECT_FALSE(nlohmann::json::parse(json.out).at("directions_settled").get<bool>());
 }
 
 TEST(StaticsCommand, AtRestNoEfficiencyIsPrintedAndLossesAreSaidToBeOpen) {

@@ -333,6 +333,8 @@ TEST(ModelFile, APointOfATableIsNamedWithItsOwnPlace) {
 TEST(ModelFile, GearPathsAndSafeCommandsNameClutchesThereAre) {
     EXPECT_EQ(refusal(two_masses + wet_clutch + "gear_paths:\n  one: {closed: [F1]}\n"),
               "m.yaml:31:9: gear path \"one\": closed = F1; must name a clutch; nearest: F2");
+    EXPECT_EQ(refusal(two_masses + wet_clutch + "gear_paths:\n  one: {closed: [F2, F2]}\n"),
+              "m.yaml:31:9: gear path \"one\": closed = F2; must be named once");
     EXPECT_EQ(refusal(two_masses + wet_clutch +
                       "gear_paths:\n  one: {closed: [F2], lever: 1}\n  two: {closed: [F2], lever: 1}\n"),
               "m.yaml:32:23: gear path \"two\": lever = 1; is taken by \"one\"");

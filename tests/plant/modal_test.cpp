@@ -41,6 +41,29 @@ TEST(Modes, DampingRatioOfTwoInertiasIsTheClosedForm) {
     EXPECT_NEAR(result.modes[0].damping_ratio, zeta, 1e-12);
 }
 
+// 2 on a spring to 0.5, which a damper of 20000 holds: p(s) = (2s² + ds + k)(0.5s² + (d + D)s + k) − (ds + k)².
+TEST(Modes, AStrongDamperHoldsWhatItJoinsAndTheRestSwings) {
+    const double k = 444132.2, small = 1, strong = 20000;
+    Description d;
+    d.masses = {machines::mass("a", 2), machines::mass("b", 0.5)};
+    d.shafts = {machines::shaft("s", "a", "b", k, small)};
+    d.dampers = {{"D", "b", "", strong}};
+    const ModalResult result = natural_modes(d, {});
+    ASSERT_EQ(result.damped.size(), 1u);
+    const DampedMode& mode = result.damped[0];
+    const double size = mode.frequency * turn, zeta = mode.damping_ratio;
+    const std::complex<double> s = size * std::complex<double>(-zeta, std::sqrt(1 - zeta * zeta));
+    const auto a = 2. * s * s + small * s + k, b = 0.5 * s * s + (small + strong) * s + k,
+               coupling = small * s + k;
+    EXPECT_LT(std::abs(a * b - coupling * coupling), 1e-9 * std::abs(coupling * coupling));
+    EXPECT_NEAR(mode.frequency, std::sqrt(k / 2) / turn, 0.03);  // nearly as if b were held
+    EXPECT_NEAR(zeta, k / (2 * strong * std::sqrt(k / 2)), 1e-3);
+    EXPECT_GT(mode.kinetic_share[0], 0.99);
+    EXPECT_NEAR(result.modes.at(0).frequency, std::sqrt(k * 2.5) / turn, 1e-9);
+    EXPECT_TRUE(result.damping_shifts());
+    EXPECT_FALSE(natural_modes(two_inertias(2), {}).damping_shifts());
+}
+
 TEST(Modes, GearBetweenShaftsTransformsStiffness) {
     // a –s– b –gear u– c –t– d: the chain seen from a has inertia b + c/u², stiffness t/u², inertia d/u².
     Description d;
@@ -234,6 +257,94 @@ TEST(Tractor, RollingTyreDampsTheLowestMode) {
     EXPECT_GT(natural_modes(d, {"Fc", "F2"}, rolling).damped.at(0).damping_ratio, 0.1);
 }
 
+// ---- loops and what they block ------------------------------------------------------------------------
+
+using Names = std::vector<std::string>;
+
+Description in_and_out() {
+    Description d;
+    d.masses = {machines::mass("a", 1), machines::mass("o", 3)};
+    d.input_mass = "a";
+    d.output_mass = "o";
+    return d;
+}
+
+GearVariant only_gear(Description d, const Names& closed) {
+    d.gear_paths = {{"one", closed}};
+    return gear_variants(d).at(0);
+}
+
+TEST(TieUps, ALoopWithAShaftOrAPlayInItSharesByStiffness) {
+    Description d = in_and_out();
+    d.shafts = {machines::shaft("s", "a", "o", 1000, 1), machines::shaft("t", "a", "o", 2000, 1)};
+    EXPECT_TRUE(only_gear(d, {}).tie_ups.empty());
+    d.shafts.pop_back();
+    d.clutches = {machines::clutch("K", "a", "o"), machines::clutch("L", "a", "o")};
+    EXPECT_TRUE(only_gear(d, {"K"}).tie_ups.empty());
+    const auto tied = only_gear(d, {"K", "L"}).tie_ups;
+    ASSERT_EQ(tied.size(), 1u);
+    EXPECT_EQ(tied[0].devices, (Names{"K", "L"}));
+    Backlash play;
+    play.name = "B", play.a = "a", play.b = "o", play.stiffness = 1e5, play.gap = 0.01;
+    d.shafts.clear();
+    d.backlashes = {play};
+    EXPECT_TRUE(only_gear(d, {"K"}).tie_ups.empty());
+}
+
+// Two gears to twin countershafts, two from them: the loop gives in the countershafts, unless these are clutches.
+TEST(TieUps, TwinCountershaftsAreTiedUpOnlyWhereTheyAreRigid) {
+    Description d = in_and_out();
+    for (const char* name : {"c1", "c2", "d1", "d2"}) d.masses.push_back(machines::mass(name, 0.1));
+    d.gears = {machines::gear("g1", "a", "c1", -2), machines::gear("g2", "a", "c2", -2),
+               machines::gear("h1", "d1", "o", -2), machines::gear("h2", "d2", "o", -2)};
+    d.shafts = {machines::shaft("s1", "c1", "d1", 1e4, 1), machines::shaft("s2", "c2", "d2", 1.5e4, 1)};
+    EXPECT_TRUE(only_gear(d, {}).tie_ups.empty());
+    EXPECT_NEAR(only_gear(d, {}).ratio.value(), 4, 1e-12);
+    d.shafts.clear();
+    d.clutches = {machines::clutch("K1", "c1", "d1"), machines::clutch("K2", "c2", "d2")};
+    ASSERT_EQ(only_gear(d, {"K1", "K2"}).tie_ups.size(), 1u);
+    EXPECT_EQ(only_gear(d, {"K1", "K2"}).tie_ups[0].devices, (Names{"g1", "g2", "h1", "h2", "K1", "K2"}));
+    // With other ratios they let nothing turn, and no shaft that gives changes that.
+    d.gears[3].ratio = -3;
+    EXPECT_EQ(only_gear(d, {"K1", "K2"}).blocked_by, (Names{"g1", "g2", "h1", "h2", "K1", "K2"}));
+    d.clutches.pop_back();
+    EXPECT_TRUE(only_gear(d, {"K1"}).blocked_by.empty());
+    d.shafts = {machines::shaft("s2", "c2", "d2", 1.5e4, 1)};
+    EXPECT_EQ(only_gear(d, {"K1"}).blocked_by, (Names{"g1", "g2", "h1", "h2", "K1", "s2"}));
+}
+
+TEST(TieUps, LoopsAreThoseThatTheMemberCloses) {
+    Description d = in_and_out();
+    d.masses.push_back(machines::mass("x", 1));
+    d.gears = {machines::gear("g", "a", "x", 2), machines::gear("h", "a", "x", 2)};
+    d.clutches = {machines::clutch("K", "a", "o"), machines::clutch("L", "a", "o")};
+    const Structure s = build_structure(d);
+    const auto loop = [&](const Names& closed, const std::string& member) {
+        const auto found = loop_through(rigid_set(d, s, closed, rigid_alone), s.inertia, member);
+        return found ? found->devices : Names{};
+    };
+    EXPECT_EQ(loop({"K"}, "K"), Names{});
+    EXPECT_EQ(loop({"K", "L"}, "L"), (Names{"K", "L"}));
+    EXPECT_EQ(loop({"K", "L"}, "g"), (Names{"g", "h"}));
+    EXPECT_EQ(loop({"K", "L"}, "nobody"), Names{});
+    EXPECT_EQ(tie_ups(rigid_set(d, s, {"K", "L"}, rigid_alone), s.inertia).size(), 2u);
+}
+
+// A tyre slips: one that rolls at another speed holds nothing, a brake on the wheel holds the body.
+TEST(TieUps, TyresBlockNothingBrakesOfTheirWheelsDo) {
+    Description d = tractor();
+    d.output_mass = "vehicle";
+    d.masses.push_back(machines::mass("front", 100));
+    d.gears.push_back(machines::gear("lead", "axle_input", "front", 0.6));
+    d.tyres.push_back(d.tyres[0]);
+    d.tyres[1].name = "front_tyre";
+    d.tyres[1].wheel = "front";
+    d.clutches.push_back(machines::clutch("brake", "wheels", ""));
+    EXPECT_TRUE(only_gear(d, {"Fc", "F2"}).blocked_by.empty());
+    EXPECT_TRUE(only_gear(d, {"Fc", "F2"}).tie_ups.empty());
+    EXPECT_EQ(only_gear(d, {"Fc", "F2", "brake"}).blocked_by, Names{"brake"});
+}
+
 // ---- states beside the gears ------------------------------------------------------------------------
 
 std::vector<std::string> names_of(const std::vector<GearVariant>& states) {
@@ -243,7 +354,6 @@ std::vector<std::string> names_of(const std::vector<GearVariant>& states) {
 }
 
 TEST(OtherStates, AreTheOpenMachineBesideGearPathsElseAlsoTheStartAndAllClosed) {
-    using Names = std::vector<std::string>;
     Description d = tractor();
     EXPECT_EQ(names_of(other_states(d)), Names{"all open"});
     d.gear_paths.clear();

@@ -211,6 +211,50 @@ TEST(Warnings, MainOrderIsHalfTheNumberOfCylinders) {
     EXPECT_THROW(warnings_of(d), ModelError);
 }
 
+// The load is nearly held: 50.33 Hz were it quite. Undamped it would be 59.6 Hz and, as the shape is then, overdamped.
+TEST(Warnings, EngineOrderMeetsTheModeThatAStrongDamperLeaves) {
+    Description d = engine_on_a_shaft();
+    d.dampers = {{"D", "load", "", 20000}};
+    EXPECT_EQ(warnings_of(d),
+              Lines{"all open: engine order 3 meets the mode at 50.4 Hz at 1008 rpm (damping ratio 0.02)"});
+}
+
+TEST(Warnings, EngineOrderIsNotSaidToMeetWhatItHardlyExcites) {
+    Description d = engine_on_a_shaft();
+    const double critical = 2 * std::sqrt(200000 / (1 / 2. + 1 / 5.));
+    d.shafts[0].damping = 0.49 * critical;
+    EXPECT_EQ(warnings_of(d).size(), 1u);
+    d.shafts[0].damping = 0.51 * critical;
+    EXPECT_EQ(warnings_of(d), Lines{});
+    // 2 and 5 on a shaft beside the engine: it has J₁/(J₁ + J_e) of what the near mass has.
+    d = engine_on_a_shaft();
+    d.masses = {mass("engine", 2e4), mass("near", 2), mass("load", 5)};
+    d.shafts = {shaft("s", "near", "load", 200000, 0), shaft("soft", "engine", "near", 10, 0)};
+    EXPECT_EQ(warnings_of(d), Lines{});
+}
+
+// ---- gears that block themselves ----------------------------------------------------------------------
+
+TEST(Warnings, NameAGearPathThatBlocksItsOutputAndByWhat) {
+    Description d;
+    d.masses = {mass("a", 1), mass("b", 1), mass("o", 3)};
+    d.gears = {gear("g1", "a", "b", 2), gear("g2", "a", "o", 3)};
+    d.clutches = {machines::clutch("K", "b", "o"), machines::clutch("B", "o", "")};
+    d.gear_paths = {{"one", {"K"}}, {"two", {}}, {"three", {"B"}}};
+    d.input_mass = "a";
+    d.output_mass = "o";
+    EXPECT_EQ(warnings_of(d), (Lines{"gear one: the output \"o\" is blocked by g1, g2, K",
+                                     "gear three: the output \"o\" is blocked by B"}));
+    // Through a shaft as well; what gears alone hold is told of them once.
+    d.masses.push_back(mass("t", 1));
+    d.clutches[1].a = "t";
+    d.shafts = {shaft("s", "o", "t", 1000, 1)};
+    EXPECT_EQ(warnings_of(d).back(), "gear three: the output \"o\" is blocked by B, s");
+    d.gears.push_back(gear("g3", "a", "b", 3));
+    for (const std::string& line : warnings_of(d))
+        EXPECT_EQ(line.find("is blocked by"), std::string::npos) << line;
+}
+
 // ---- what steps do not resolve ------------------------------------------------------------------------
 
 // 20 Nm more per 0.1 rad/s on 1e-4 kg m²: gone within 0.5 µs.
