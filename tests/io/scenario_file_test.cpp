@@ -240,7 +240,7 @@ TEST(ScenarioFile, AnEventThatItsDeviceNeverTellsIsRefusedWithThoseItDoes) {
         event_refusal("kind: mesh_sticks, device: F2"),
         place +
             "mesh_sticks of F2 never happens; its events are lock, break_away, engage, release, tie_up, "
-            "fall_back, facing_warning, facing_failure");
+            "fall_back, facing_warning, facing_failure, reverse");
     EXPECT_EQ(event_refusal("kind: break_away, device: engine"),
               place + "break_away of engine never happens; its events are engine_stalls, engine_starts");
     EXPECT_EQ(event_refusal("kind: drive_side, device: axle_drive"), "");
