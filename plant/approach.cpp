@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "plant/devices.h"
 #include "plant/flanks.h"
 #include "plant/integrate.h"
 #include "plant/interpolant.h"
@@ -61,7 +62,12 @@ void look_ahead(Work& w, const Mode& mode, RootSearch& search, double close_enou
 Approached approach_margin(Work& w, const Mode& mode, const Crossing& crossing, double done,
                            double until) SHIFTRIG_REALTIME {
     const int most_steps = w.model.maximum_parts > 1 ? 4 : 16;
-    const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample); };
+    // A pair that holds no more than it passes on sliding would slip backwards if it gave way below its limit. It is gone beyond by
+    // more than rounding, and less than makes it overloaded (devices.h).
+    const bool gives_way = crossing.change == Change::state && crossing.device < w.model.pairs &&
+                           w.contact[crossing.device] == locked;
+    const double over = gives_way ? 3e-10 * static_limit(w, crossing.device, w.scratch.end()) : 0;
+    const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample) + over; };
     RootSearch search{done, until, left(w.scratch.begin()), left(w.scratch.end()),
                       done + crossing.theta * (until - done)};
     // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
@@ -69,19 +75,17 @@ Approached approach_margin(Work& w, const Mode& mode, const Crossing& crossing, 
     // only lock, or let go, again.
     const bool by_itself = acts_by_itself(crossing.change),
                safely = crossing.change == Change::overrun || crossing.change == Change::hold;
-    // One that holds no more than it passes on sliding would slip backwards if it gave way below its limit.
-    const bool gives_way = crossing.change == Change::state && crossing.device < w.model.pairs &&
-                           w.contact[crossing.device] == locked;
     const double close_enough = (by_itself ? 1e-2 : safely ? 1e-3 : 1e-6) * search.size();
-    const double beyond = (by_itself ? 3e-3 : safely ? 3e-4 : gives_way ? 1e-7 : 0) * (until - done);
-    if (!mode.tree) look_ahead(w, mode, search, 1e-7 * search.size(), left);
+    const double beyond = (by_itself ? 3e-3 : safely ? 3e-4 : 0) * (until - done);
+    if (!mode.tree) look_ahead(w, mode, search, (gives_way ? 1e-10 : 1e-7) * search.size(), left);
     search.place = std::min(search.place + beyond, until);
     for (int steps = 1;; ++steps) {
         const double reached = search.place;
         integrate(w, mode, reached);
         const double rest = left(w.scratch.end());
-        const bool near = std::fabs(rest) <= close_enough, last = steps == most_steps;
-        if (near && (rest <= 0 || !(gives_way || crossing.change == Change::hold))) return {reached};
+        const bool near = std::fabs(rest) <= close_enough, last = steps == most_steps,
+                   beyond_it = rest <= 0.9 * over || !(gives_way || crossing.change == Change::hold);
+        if (near && beyond_it) return {reached};
         if (last && crossing.change != Change::hold) return {reached, near};
         search.tell(rest, beyond);
         if (steps < most_steps) continue;

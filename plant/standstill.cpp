@@ -16,10 +16,15 @@ namespace {
 constexpr unsigned char closed = locked;  // and stuck
 constexpr double resting = 1e-12;         // share of the accelerations there could be: none
 
-// Torque limits of a pair: what it can hold, or, once it broke away in this instant, what it passes on sliding.
+// Has it broken away, in this instant or before, where others held it at no slip?
+bool is_overcome(const Work& w, int pair) {
+    return w.scratch.overcome[static_cast<std::size_t>(pair)] != 0 || slips(w.contact[pair]);
+}
+
+// Torque limits of a pair: what it can hold, or, once it broke away, what it passes on sliding.
 void set_limits(const Work& w, const Sample& s, RestJoint& joint) {
     const int k = joint.device;
-    const bool overcome = w.scratch.overcome[static_cast<std::size_t>(k)] != 0;
+    const bool overcome = is_overcome(w, k);
     const auto limit = [&](double sense) {
         const double sliding = sliding_limit(w.model, k, sense, s);
         return overcome ? sliding : std::max(static_limit(w.model, k, sense, s), sliding);
@@ -67,7 +72,7 @@ struct Search {
     unsigned char& eased(int device) const { return w.scratch.eased[static_cast<std::size_t>(device)]; }
     // Would the pair hold more than it passes once it slips in this sense?
     bool has_reserve(int device, double sense) const {
-        if (device >= w.model.pairs || overcome(device)) return false;
+        if (device >= w.model.pairs || is_overcome(w, device)) return false;
         return sliding_limit(w.model, device, sense, s) < static_limit(w.model, device, sense, s);
     }
     void break_away(int i) {
@@ -227,9 +232,10 @@ struct Search {
                 break_away(most);
                 continue;
             }
-            if (attempt_least() || attempt_shared() || attempt_held()) return true;
+            if (attempt_least() || attempt_shared()) return true;
             if (break_more_away()) continue;
-            if (!breaks_away || overcome(gives_way)) return attempt([&](int i) { return vertex[i]; });
+            if (!breaks_away || overcome(gives_way))
+                return attempt_held() || attempt([&](int i) { return vertex[i]; });
             break_away(giving);  // it is at its limit whatever the split leaves it
         }
     }

@@ -51,9 +51,9 @@ TEST(Instant, ABrakeWithinItsLimitStaysWhereTheClutchBeforeItSlips) {
     }
 }
 
-// A brake that broke away at rest passes on 3.99 Nm where the other one holds. When that is at its limit too the first one holds
-// again, up to the 4.64 Nm that it can: the same at every length of the step, and with the gear turned round.
-TEST(Instant, ALastHolderAtItsLimitLeavesTheRestToOneThatPushed) {
+// A brake that broke away at rest passes on 3.99 Nm where the other one holds, and 4.64 Nm no more. When the other one is at its limit
+// too all goes, whatever the length of the step.
+TEST(Instant, ALastHolderAtItsLimitLetsAllGo) {
     Description d;
     d.masses = {mass("m0", 1.7237), mass("m1", 0.2436, -9.593)};
     d.gears = {gear("g0", "m1", "m0", 1.34744, 0.60927, 0.86612, 0.1416)};
@@ -66,10 +66,11 @@ TEST(Instant, ALastHolderAtItsLimitLeavesTheRestToOneThatPushed) {
         options.step_size = h;
         const Both both(d, 0.34, options);
         both.expect_mirror_images();
-        const std::vector<double> gives_way = both.forward.times(EventKind::break_away, "b0");
-        ASSERT_EQ(gives_way.size(), 2u) << h;
-        EXPECT_NEAR(gives_way[1], 0.335735, 1e-6) << h;
-        EXPECT_NEAR(both.forward.times(EventKind::mesh_releases, "g0").back(), 0.335735, 1e-6) << h;
+        for (const char* brake : {"b0", "b1"})
+            ASSERT_EQ(both.forward.times(EventKind::break_away, brake).size(), 1u) << h;
+        EXPECT_NEAR(both.forward.times(EventKind::break_away, "b0")[0], 0.33351209, 1e-8) << h;
+        EXPECT_NEAR(both.forward.times(EventKind::break_away, "b1")[0], 0.33358084, 1e-8) << h;
+        EXPECT_NEAR(both.forward.times(EventKind::mesh_releases, "g0").back(), 0.33358084, 1e-8) << h;
     }
 }
 
@@ -95,11 +96,11 @@ TEST(Instant, NoOtherBrakeIsTornLooseThatCouldHold) {
         const Both both(d, 0.11);
         both.expect_mirror_images();
         const Rig& rig = both.forward;
-        ASSERT_EQ(rig.times(EventKind::break_away, "b1").size(), 2u) << reversed;
+        ASSERT_EQ(rig.times(EventKind::break_away, "b1").size(), 1u) << reversed;
         EXPECT_NEAR(rig.times(EventKind::break_away, "b1")[0], 0.0948374, 1e-6) << reversed;
         EXPECT_EQ(rig.times(EventKind::break_away, "b0").size(), 1u) << reversed;
         EXPECT_NEAR(rig.times(EventKind::break_away, "b0")[0], 0.0987599, 1e-6) << reversed;
-        EXPECT_NEAR(rig.times(EventKind::mesh_releases, "g0").back(), 0.0999937, 1e-6) << reversed;
+        EXPECT_NEAR(rig.times(EventKind::mesh_releases, "g0").back(), 0.0987599, 1e-6) << reversed;
     }
 }
 
