@@ -15,3 +15,5 @@ add_test(NAME two_processes_on_udpcan COMMAND ${MULTICAST} ${TWO_PROCESSES} udpc
 
 add_test(NAME run_command_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/run_command_test.py
   $<TARGET_FILE:shiftrig> $<TARGET_FILE:shiftrig-tcu> ${CMAKE_SOURCE_DIR}/config)
+add_test(NAME told_events_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/told_events_test.py
+  $<TARGET_FILE:shiftrig> ${CMAKE_SOURCE_DIR}/config)
