@@ -114,6 +114,7 @@ Plot draw(const Run& run, double from, double until, const Names& clutches, cons
         const bool ours = std::find(clutches.begin(), clutches.end(), change.device) != clutches.end();
         const char* word = change.event.kind == plant::EventKind::lock         ? " locks"
                            : change.event.kind == plant::EventKind::break_away ? " slips"
+                           : change.event.kind == plant::EventKind::reverse    ? " turns"
                                                                                : nullptr;
         const bool inside = change.event.time >= plot.from && change.event.time <= plot.until;
         if (ours && inside && word != nullptr)

@@ -12,7 +12,8 @@ namespace {
 // A torque of an event, whether it is one of a truck or of a watch.
 std::string amount(const Event& event, double value) {
     const double size = std::max(std::fabs(event.torque), std::fabs(event.capacity));
-    if (size >= 1 || std::fabs(value) <= 1e-9 * size) return format("%.1f", value);
+    if (size >= 1 && std::fabs(value) < 0.05) value = 0;  // no −0.0
+    if (size >= 1 || std::fabs(value) <= 1e-9 * size) return format("%.1f", value + 0.);
     return format("%.3g", value);
 }
 
@@ -131,6 +132,7 @@ std::string explain(const Model& model, const Event& event) {
             return line + "sticks: rest needs " + rest(event);
         case EventKind::mesh_releases:
             if (event.value == 2) return line + "moves again, with others that held it";
+            if (event.value == 3) return line + "passes through rest, carried along by others";
             return line + (event.value == 0 ? "moves again" : "passes through rest") + ": rest would need " +
                    rest(event);
         case EventKind::drive_side:

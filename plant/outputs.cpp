@@ -44,9 +44,21 @@ void fill_outputs(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     const double stored = w.scratch.stored;
     const double* energy = block + m.layout.energy;
     put(energy[0], stored, energy[1], stored - energy[2] - energy[0] + energy[1]);
-    const Certificate& c = w.outputs.certificate;
-    put(c.torque_residual, c.constraint_violation, c.energy_defect, double(c.events), double(c.fall_backs),
-        double(c.mode_lookups), double(c.mode_misses), double(c.flags));
+    show_certificate(w.outputs);
 }
 
 }  // namespace shiftrig::plant::detail
+
+namespace shiftrig::plant {
+
+// The last of all outputs (model.cpp).
+void show_certificate(Outputs& outputs) SHIFTRIG_REALTIME {
+    const Certificate& c = outputs.certificate;
+    const double values[] = {c.torque_residual,     c.constraint_violation, c.energy_defect,
+                             double(c.events),      double(c.fall_backs),   double(c.mode_lookups),
+                             double(c.mode_misses), double(c.flags)};
+    double* const last = outputs.value.data() + outputs.value.size() - std::size(values);
+    for (std::size_t i = 0; i < std::size(values); ++i) last[i] = values[i];
+}
+
+}  // namespace shiftrig::plant

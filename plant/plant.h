@@ -78,7 +78,7 @@ struct Event {
     double slip = 0;      // [rad/s]
     // lock: ±1, the sense in which it slipped until then, 0 where nothing pressed it; break_away, reverse: +1 or −1, the sense in which it slips from here on, 0 where others hold it at rest; drive_side: x; flanks:
     // +1 or −1, which one; engines: speed [rad/s]; facings: temperature [°C]; mesh_releases: 1 where it only passes through rest, 2
-    // where others held it; untold: how many
+    // (or 3) where others held it, or carry it along; untold: how many
     double value = 0;
     // tie_up: bit i of pair `device` + i, which shares the load; the last bit: so do others further away.
     std::uint64_t members = 0;
@@ -229,6 +229,9 @@ struct Start {
 };
 // Throws ModelError where a name is none of the model's, or speeds contradict each other.
 void start(const Model& model, State& state, const Start& start, const Inputs& inputs);
+
+// Its certificate's signals anew, where somebody sums up several steps.
+void show_certificate(Outputs& outputs) SHIFTRIG_REALTIME;
 
 // Time 0 is now: steps, ways, heat and the energy account count from here on, the motion is as it was.
 void begin_account(const Model& model, State& state) noexcept;

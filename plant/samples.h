@@ -56,10 +56,10 @@ struct LossAtRest {
     double needed = 0, allowed = 0;
 };
 
-// What a device did in an instant: closed, with this slip left (a pair); opened, at this torque of what it could hold (a pair), or
-// with this loss needed and allowed (a mesh). Told once the instant is settled.
+// What a device did in an instant: was pressed from now on, or no more (a pair); closed, with this slip left (a pair); opened, at
+// this torque of what it could hold (a pair), or with this loss needed and allowed (a mesh). Told once the instant is settled.
 struct Note {
-    bool closed = false, opened = false;
+    bool pressing = false, closed = false, opened = false;
     double slip = 0, torque = 0, capacity = 0;
 };
 

@@ -21,6 +21,7 @@ bool engage_and_release(Work& w, Sample& s) {
         const bool capable = s.sliding[k] > 0 || s.holding[k] > 0 || is_pressed(w, k, s.at);
         if (capable != (w.contact[k] == free_running)) continue;
         changed = true;
+        note_pressing(w, k);
         if (!capable) {
             w.contact[k] = free_running;
             continue;

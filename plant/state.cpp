@@ -283,6 +283,8 @@ void begin_account(const Model& model, State& state) noexcept {
     detail::write_integer(block, 0);
     std::fill(block + m.layout.distances, block + m.layout.auxiliary, 0.);
     std::fill(block + m.layout.heat, block + m.layout.temperatures, 0.);
+    std::fill_n(block + m.layout.resting, m.meshes, 0.);  // told anew
+    std::fill_n(block + m.layout.loops, m.pairs, 0.);
     double* energy = block + m.layout.energy;
     energy[0] = energy[1] = 0;
     energy[2] = detail::stored_energy(m, block + m.layout.speeds,

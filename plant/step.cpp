@@ -74,6 +74,8 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     // losses ([Algin] eq. (11), (14), (15), (16)–(25)); what cannot hold at t0+ opens (eq. (12)).
     Mode* mode = &begin_mode(w);
 
+    if (read_integer(w.state) == 0) tell_instant(w, *mode, s.begin());  // what rests
+
     double length = 1;             // of a part, at most
     int leans = m.maximum_events;  // loads that pass from pair to mesh at rest: not events, but bounded too
     int dips = m.maximum_events;   // margins looked at where they are least

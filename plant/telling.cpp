@@ -82,7 +82,7 @@ bool some_pushes(const Work& w, const Mode& mode, const Sample& s) {
 
 Note& noted(Work& w, int device) {
     Note& note = w.scratch.notes[static_cast<std::size_t>(device)];
-    if (!note.closed && !note.opened) {
+    if (!note.pressing && !note.closed && !note.opened) {
         w.scratch.noted[static_cast<std::size_t>(w.scratch.noted_count)] = device;
         ++w.scratch.noted_count;
     }
@@ -127,6 +127,7 @@ void tell_pair(Work& w, const Mode& mode, int k, unsigned char was, const Sample
         event.kind = EventKind::engage;
         event.capacity = s.sliding[k];
         event.slip = device_slip(w, k, s.z);
+        event.value = slip_sign(is);
     } else if (was == locked) {
         event.kind = EventKind::break_away;
         event.torque = note.torque;
@@ -160,9 +161,12 @@ void tell_mesh(Work& w, const Mode& mode, int k, unsigned char was, const LossAt
         if (rests == 0 && !passes) return;
         rests = 0;
         event.kind = EventKind::mesh_releases;
-        event.torque = note.torque;
-        event.capacity = note.capacity;
-        event.value = passes ? 1 : note.torque > note.capacity ? 0 : 2;
+        const bool alone = note.opened && note.torque > note.capacity;
+        if (alone) {
+            event.torque = note.torque;
+            event.capacity = note.capacity;
+        }
+        event.value = (passes ? 1 : 0) + (alone ? 0 : 2);
     }
     log_event(w, event);
 }
@@ -198,6 +202,10 @@ bool log_event(Work& w, const Event& event) SHIFTRIG_REALTIME {
     }
     events.back() = {.time = event.time, .kind = EventKind::untold, .value = index + 2. - capacity};
     return false;
+}
+
+void note_pressing(Work& w, int pair) SHIFTRIG_REALTIME {
+    noted(w, pair).pressing = true;
 }
 
 void note_closing(Work& w, int device, double slip) SHIFTRIG_REALTIME {

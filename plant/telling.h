@@ -13,8 +13,9 @@ constexpr std::int16_t device_index(int device) noexcept {  // of an event
 // False where the step holds no more events: it is only counted.
 bool log_event(Work& work, const Event& event) SHIFTRIG_REALTIME;
 
-// To be told of this instant, once it is settled, if it stands: a pair or mesh came to rest with this slip left; a locked pair gave
+// To be told of this instant, once it is settled, if it stands: a pair is pressed or released; a pair or mesh came to rest with this slip left; a locked pair gave
 // way; a stuck mesh (a contact byte) moves, since its rest needs more than its losses allow.
+void note_pressing(Work& work, int pair) SHIFTRIG_REALTIME;
 void note_closing(Work& work, int device, double slip) SHIFTRIG_REALTIME;
 void note_opening(Work& work, int pair, const Sample& sample) SHIFTRIG_REALTIME;
 void note_release(Work& work, int device, const LossAtRest& loss) SHIFTRIG_REALTIME;

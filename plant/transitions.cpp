@@ -118,13 +118,14 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
 
 namespace {
 
-// Found within a step, where the loss of a mesh at rest turns unseen, and allows more or less then.
+// Found within a step, where the loss of a mesh at rest turns unseen, and allows more or less then; or with losses that
+// correct_directions() has turned since.
 bool give_way(Work& w, int pair, Sample& s) {
     Mode* mode = &find_mode(w.model, w.operators, w.contact, w.scratch);
-    if (mode->rests) {
-        mode = &find_directions(w, w.contact, s);
-        if (static_margin(w, pair, s) > at_its_limit * static_limit(w, pair, s)) return false;
-    }
+    if (mode->rests) mode = &find_directions(w, w.contact, s);
+    if ((mode->rests || w.scratch.turned) &&
+        static_margin(w, pair, s) > at_its_limit * static_limit(w, pair, s))
+        return false;
     return give_way(w, *mode, most_used(w, w.contact, s), pair, s);
 }
 

@@ -208,8 +208,12 @@ void Rig::step_plant() SHIFTRIG_REALTIME {
         std::copy_n(outputs_.events.begin(), fit,
                     events_.begin() + static_cast<std::ptrdiff_t>(event_count_));
         event_count_ += fit;
-        events_not_kept_ += outputs_.event_count - static_cast<int>(fit);
+        // Where there are more than fit the last one is no change, but says so.
+        const bool all = outputs_.event_count <= plant::Outputs::event_capacity;
+        events_not_kept_ += outputs_.event_count - static_cast<int>(fit) + (all ? 0 : 1);
     }
+    outputs_.certificate = certificate_;
+    if (setup_.substeps > 1) plant::show_certificate(outputs_);
 }
 
 void Rig::publish() SHIFTRIG_REALTIME {

@@ -249,7 +249,7 @@ void print_summary(const rig::Rig& rig, const rig::Session& session, double diss
     if (session.command_to_signal().count() > 0)
         std::cout << "command → signal  " << session.command_to_signal().percentiles() << '\n';
     const auto told = std::count_if(run.changes.begin(), run.changes.end(),
-                                    [](const analysis::Change& change) { return change.of_machine(); });
+                                    [](const analysis::Change& change) { return !change.device.empty(); });
     std::cout << describe(session.certificate(), told, dissipated(rig) - dissipated_before);
     if (!scorecard.shifts.empty()) std::cout << '\n' << analysis::to_text(scorecard);
 }

@@ -36,7 +36,9 @@ nlohmann::json event_json(const plant::Event& event, const std::string& device,
             json["temperature_degc"] = event.value;
             break;
         case K::mesh_releases:
-            json["passes_through"] = event.value == 1;
+            json["passes_through"] = event.value == 1 || event.value == 3;
+            json["with_others"] = event.value >= 2;
+            if (event.value >= 2) json.erase("margin_nm");
             break;
         case K::untold:
             json["count"] = event.value;

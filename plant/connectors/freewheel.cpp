@@ -77,10 +77,17 @@ std::string in_words(const Freewheel& f, const Event& event) {
         case EventKind::lock:
             return format("locks: slip %.3g, torque %.1f of %.1f Nm rated", event.slip, event.torque,
                           f.rated_torque);
-        case EventKind::engage:
-            return format(blocked_sense(f) * event.slip < 0 ? "begins overrunning: slip %.3f rad/s"
-                                                            : "begins slipping: slip %.3f rad/s",
+        case EventKind::engage: {
+            const double sense = event.slip != 0 ? event.slip : event.value;
+            return format(blocked_sense(f) * sense < 0 ? "begins overrunning: slip %.3f rad/s"
+                                                       : "begins slipping: slip %.3f rad/s",
                           event.slip);
+        }
+        case EventKind::reverse:
+            return format(event.torque == 0 || blocked_sense(f) * event.torque < 0
+                              ? "overruns: its slip turns, drag %.1f of %.1f Nm"
+                              : "slips overloaded: its slip turns, torque %.1f of %.1f Nm sliding",
+                          event.torque, event.capacity);
         default:
             return {};
     }

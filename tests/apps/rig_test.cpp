@@ -312,6 +312,21 @@ TEST(Rig, CertificateOfARunKeepsTheWorstAndCountsTheTicksOfEachFlag) {
     EXPECT_EQ(run.ticks, 3);
 }
 
+TEST(Rig, TheCertificatesSignalsAreOfAllSubsteps) {
+    Choices choices;
+    choices.substeps = 5;
+    Rig rig(make_setup(choices, scenario("plough_upshift")));
+    const int signal = rig.signals().find("certificate.events");
+    ASSERT_GE(signal, 0);
+    int located = 0;
+    for (int i = 0; i < 6000; ++i) {
+        rig.tick();
+        ASSERT_EQ(rig.value(signal), rig.certificate().events) << "tick " << i;
+        located += rig.certificate().events;
+    }
+    EXPECT_GT(located, 1);
+}
+
 // A `must_not` says nothing about events that were dropped, so every one is counted.
 TEST(Rig, EventsThatDoNotFitATickOrTheCollectorAreCounted) {
     std::string text = std::string(ploughing_in_f2) + "duration_s: 1\ntimeline:\n";

@@ -163,6 +163,61 @@ TEST(Explain, MeshesThatGoTogetherAreToldWithWhatTheirMotionNeeds) {
                   "t=0.1859137 G2 moves again: rest would need 0.129 Nm of its losses, which allow 0.129"}));
 }
 
+// A brake drives its gear through rest: no loss could hold it, and none was asked.
+TEST(Explain, AMeshThatOthersCarryThroughRestIsToldSo) {
+    Description d;
+    d.name = "carried";
+    d.masses = {mass("a", 1, 8), mass("b", 1, 4)};
+    Gear gear;
+    gear.name = "G", gear.a = "a", gear.b = "b", gear.ratio = 2, gear.efficiency = 0.9;
+    d.gears = {gear};
+    d.clutches = {clutch("B", "b", "", 10)};
+    d.sources = {source("a", constant(-50))};
+    Rig rig(d);
+    const std::vector<std::string> lines = told(rig, 0.2);
+    ASSERT_GE(lines.size(), 3u);
+    EXPECT_EQ(lines[1], "t=0.1798165 B slips the other way: torque -10.0 of 10.0 Nm sliding");
+    EXPECT_EQ(lines[2], "t=0.1798165 G passes through rest, carried along by others");
+}
+
+// A brake is released at a tick, which tears another one loose that held beside it.
+TEST(Explain, CausesAreToldBeforeWhatFollows) {
+    Description d;
+    d.name = "two brakes";
+    d.masses = {mass("a", 1)};
+    Waveform released = constant(1, -1e300, 1);
+    Waveform applied;
+    applied.pieces = {{.from = 0.5, .slope = 1}};
+    d.clutches = {clutch("B2", "a", "", 30, 1.1, ActuationDirect{.profile = applied}),
+                  clutch("B1", "a", "", 50, 1.3, ActuationDirect{.profile = released})};
+    d.clutches[1].initially_locked = true;
+    d.sources = {source("a", constant(30))};
+    Rig rig(d);
+    std::vector<std::string> lines = told(rig, 1.1);
+    ASSERT_GE(lines.size(), 2u);
+    lines.erase(lines.begin(), lines.end() - 2);
+    EXPECT_EQ(lines,
+              (std::vector<std::string>{"t=1.0000000 B1 is free: slip 0.000 rad/s",
+                                        "t=1.0000000 B2 breaks away: torque 30.0 beyond 16.5 Nm static"}));
+}
+
+// Where a run's account begins, what rests is told, though it has rested before.
+TEST(Explain, WhatRestsWhereTheAccountBeginsIsTold) {
+    Description d;
+    d.name = "gear";
+    d.masses = {mass("a", 1), mass("b", 1)};
+    Gear gear;
+    gear.name = "g", gear.a = "a", gear.b = "b", gear.ratio = 1, gear.efficiency = 0.5;
+    d.gears = {gear};
+    d.sources = {source("a", constant(10)), source("b", constant(-8))};
+    Rig rig(d);
+    const std::vector<std::string> rests = {
+        "t=0.0000000 g sticks: rest needs 2.0 Nm of its losses, which allow 5.0"};
+    EXPECT_EQ(told(rig, 0.1), rests);
+    begin_account(rig.model, rig.state);
+    EXPECT_EQ(told(rig, 0.1), rests);
+}
+
 // A pinion that nothing loads turns its power to and fro with every swing; the loaded one is told once a reversal.
 TEST(Explain, AReversalOfPowerIsToldOnceTheMeshIsLoaded) {
     Description d;

@@ -305,6 +305,29 @@ TEST(Freewheel, OneThatIsLetGoUnderLoadIsSaidToHaveBeenLoaded) {
               "t=0.0500000 F overruns: torque was 10.0 Nm, it passes on none beyond a drag of 0.0");
 }
 
+// On a sprag of 100 Nm, of which 70 are left beyond it: no slip, or one that turns, says by itself which way it goes.
+TEST(Freewheel, WhichWayItGoesIsToldAtNoSlipToo) {
+    const auto told = [](Sense blocks, double speed, Waveform torque, double until) {
+        Description d;
+        d.masses = {mass("a", 1, speed)};
+        d.freewheels = {freewheel("F", "a", "", 100, 0.3, blocks, 0.7)};
+        d.sources = {source("a", std::move(torque))};
+        Rig rig(d);
+        rig.run(until);
+        std::vector<std::string> lines;
+        for (const Event& event : rig.events) lines.push_back(explain(rig.model, event));
+        return lines;
+    };
+    EXPECT_EQ(told(Sense::backward, 0, constant(10), 0.1),
+              (std::vector<std::string>{"t=0.0000000 F begins overrunning: slip 0.000 rad/s"}));
+    EXPECT_EQ(told(Sense::forward, -5, constant(120), 0.1).back(),
+              "t=0.0415628 F slips overloaded: its slip turns, torque 70.0 of 70.0 Nm sliding");
+    Waveform turns = constant(150, -1e300, 0.5);
+    turns.pieces.push_back({.from = 0.5, .offset = -200});
+    EXPECT_EQ(told(Sense::forward, 0, turns, 0.7).back(),
+              "t=0.6481481 F overruns: its slip turns, drag -0.3 of 0.3 Nm");
+}
+
 TEST(Freewheel, StaticsKnowsWhichWayItPasses) {
     Description d = Alternating::description();
     StaticsProblem problem;
