@@ -193,14 +193,21 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end,
     w.scratch.turned = false;
     Crossing first;
     if (all_hold(w, mode, end) && flanks_hold(w, end)) return first;
-    const auto consider = [&](const Crossing& next) {
+    // Of those that give way at the beginning already, since they are pressed from nothing, the one goes first that falls
+    // shortest of its load, `use`.
+    double use_of_first = 0;
+    const auto consider = [&](const Crossing& next, double use = 0) {
         const bool by_time = locates || is_event(next.change) == is_event(first.change);
-        if (first.device < 0 || (by_time ? next.theta < first.theta : is_event(next.change))) first = next;
+        const bool at_once = next.theta == 0 && first.theta == 0 && use_of_first > 0;
+        const bool earlier = next.theta < first.theta || (at_once && use > use_of_first);
+        if (first.device >= 0 && !(by_time ? earlier : is_event(next.change))) return;
+        first = next;
+        use_of_first = use;
     };
     bool rates_known = false, middle_known = false, begin_known = false;
     for (int k = 0; k < m.first_flank; ++k) {
         if (!violated(w, mode, k, end)) continue;
-        double theta;
+        double theta, use = 0;
         Change change = Change::state;
         if (k < m.pairs && w.contact[k] == locked) {
             if (!middle_known) complete_half(w, mode);
@@ -208,6 +215,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end,
             const double g0 = margin(w, k, begin), gm = margin(w, k, w.scratch.half), g1 = margin(w, k, end);
             theta = g0 <= 0 ? 0 : parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
             if (is_weak(m, k, opening_sense(w, k, end.torque[k], end))) change = Change::overrun;
+            if (theta == 0) use = std::fabs(end.torque[k]) / static_limit(w, k, end);
         } else {
             if (!rates_known) sample_rate(w, mode, begin);
             rates_known = true;
@@ -216,7 +224,7 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end,
             theta = parabola_root(margin(w, k, begin), sign * device_slip(w, k, begin.rate) * length,
                                   margin(w, k, end));
         }
-        consider({k, theta, change});
+        consider({k, theta, change}, use);
     }
     for (int k = 0; mode.wedges && k < m.pairs; ++k) {
         if (!is_wedged(w, mode, k) || !may_hold(w, mode, k, end)) continue;

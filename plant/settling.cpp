@@ -37,6 +37,19 @@ bool engage_and_release(Work& w, Sample& s) {
     return changed;
 }
 
+// A pair that passes nothing yet moves nobody: it goes the way that the others take it.
+void follow_others(Work& w, const Mode& mode, Sample& s) {
+    bool rates_known = false;
+    for (int k = 0; k < w.model.pairs; ++k) {
+        if (!slips(w.contact[k]) || mode.bound[k] || s.sliding[k] > 0) continue;
+        if (std::fabs(device_slip(w, k, s.z)) > at_rest) continue;
+        if (!rates_known) sample_rate(w, mode, s);
+        rates_known = true;
+        const double rate = device_slip(w, k, s.rate);
+        if (std::fabs(rate) > 1e-9 * slip_scale(w, k, s.rate)) w.contact[k] = slipping(rate);
+    }
+}
+
 }  // namespace
 
 Mode& find_directions(Work& w, unsigned char* contact, Sample& s, bool complete) SHIFTRIG_REALTIME {
@@ -165,6 +178,7 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
         } else {
             w.outputs.certificate.flags |= 2;
         }
+        if (w.scratch.noted_count > 0) follow_others(w, mode, s);
         tell_instant(w, mode, s);
         for (auto* list : {&w.scratch.overcome, &w.scratch.eased})
             std::fill(list->begin(), list->end(), static_cast<unsigned char>(0));

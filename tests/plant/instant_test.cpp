@@ -104,5 +104,54 @@ TEST(Instant, NoOtherBrakeIsTornLooseThatCouldHold) {
     }
 }
 
+Clutch pressed_from(const char* name, const char* a, const char* b, double sliding, double static_ratio,
+                    double from, double slope) {
+    return clutch(name, a, b, sliding, static_ratio,
+                  ActuationDirect{.profile = {{{.from = from, .slope = slope}}}});
+}
+
+// While b2 holds nothing could slip in c1; b2 gives way in the very instant, and takes m2 along the other way. From then on
+// m0 and m1 go with (−3.5 + 0.43 + 30 t)/1.1, m2 with −(0.43 + 30 t)/0.3 rad/s².
+TEST(Instant, APairPressedFromNothingGoesAsOthersTakeItThatGiveWayWithIt) {
+    for (const bool reversed : {false, true}) {
+        Description d;
+        d.masses = {mass("m0", 1), mass("m1", 0.1), mass("m2", 0.3)};
+        d.clutches = {clutch("c0", "m0", "m1", 15), pressed_from("c1", "m0", "m2", 10, 1, 0, 3),
+                      clutch("b2", "m2", "m1", 0.43)};
+        if (reversed) std::swap(d.clutches[0], d.clutches[2]);
+        d.sources = {source("m1", constant(-3.5))};
+        const Both both(d, 0.002);
+        both.expect_mirror_images();
+        const double t = 0.002;
+        EXPECT_NEAR(both.forward.state.speeds()[0], (-3.07 * t + 15 * t * t) / 1.1, 1e-12) << reversed;
+        EXPECT_NEAR(both.forward.state.speeds()[2], -(0.43 * t + 15 * t * t) / 0.3, 1e-12) << reversed;
+        EXPECT_EQ(both.forward.fall_backs, 0);
+    }
+}
+
+// c0 slips under a load that outgrows it. What it passes the brake can hold, whichever of them is asked first.
+TEST(Instant, OfTwoPressedFromNothingTheWeakerOneGoes) {
+    for (const bool reversed : {false, true}) {
+        Description d;
+        d.masses = {mass("m0", 1), mass("m1", 0.44), mass("m2", 1), mass("m3", 1)};
+        Planetary row;
+        row.name = "r0", row.sun = "m1", row.ring = "m2", row.carrier = "m0";
+        row.ratio = -3.4, row.efficiency = 1;
+        d.planetaries = {row};
+        d.clutches = {pressed_from("c0", "m0", "m3", 8, 1, 0.03, 2.6),
+                      pressed_from("b1", "m2", "", 3.3, 1.34, 0.03, 3.35)};
+        if (reversed) std::swap(d.clutches[0], d.clutches[1]);
+        TorqueSource load = source("m3", constant(0));
+        load.waveform.pieces = {{.from = 0.03, .slope = -90}};
+        d.sources = {load};
+        const Both both(d, 0.2);
+        both.expect_mirror_images();
+        EXPECT_EQ(both.forward.state.speeds()[2], 0) << reversed;
+        EXPECT_EQ(both.forward.times(EventKind::engage, "c0").size(), 1u) << reversed;
+        EXPECT_EQ(both.forward.times(EventKind::lock, "b1").size(), 1u) << reversed;
+        EXPECT_EQ(both.forward.fall_backs, 0);
+    }
+}
+
 }  // namespace
 }  // namespace shiftrig::plant
