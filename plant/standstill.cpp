@@ -14,7 +14,7 @@ namespace shiftrig::plant::detail {
 namespace {
 
 constexpr unsigned char closed = locked;  // and stuck
-constexpr double resting = 1e-12;         // share of the accelerations there could be: none
+constexpr double resting = 1e-10;         // share of the accelerations there could be: none, but for rounding
 
 // Has it broken away, in this instant or before, where others held it at no slip?
 bool is_overcome(const Work& w, int pair) {

@@ -153,5 +153,36 @@ TEST(Instant, OfTwoPressedFromNothingTheWeakerOneGoes) {
     }
 }
 
+// A gear of nearly 1 with three devices across it: what they do to each other is 3e-3 of their torques, and an acceleration of
+// nothing but rounding was taken for motion. All is at rest; the weak brake was let go and caught again in every step.
+TEST(Instant, RoundingInANearlyParallelLoopIsNoMotion) {
+    Description d;
+    d.masses = {mass("m0", 0.12432, 5.9424), mass("m1", 0.15212, 5.9587)};
+    d.gears = {gear("g0", "m0", "m1", 0.997266, 1)};
+    const auto pressed = [](double at_first, double slope_at_first, double later, double slope_later) {
+        Waveform w;
+        w.pieces = {{.from = 0, .until = 0.126451, .offset = at_first, .slope = slope_at_first},
+                    {.from = 0.126451, .offset = later, .slope = slope_later}};
+        return ActuationDirect{.profile = w};
+    };
+    Waveform wave;
+    wave.pieces = {{.offset = 0.5, .amplitude = 0.5, .frequency = 5.742, .phase_time = 0.3331}};
+    d.clutches = {clutch("b0", "m1", "", 10, 1, pressed(0.20088, -1.5886, 0, 0.39381)),
+                  clutch("b1", "m1", "m0", 9.6792, 1, pressed(0.28197, 0, 0.30497, 0)),
+                  clutch("b2", "m1", "", 38.207, 1, pressed(0.099772, 0, 0.86276, 0)),
+                  clutch("b3", "m0", "m1", 10, 1, ActuationDirect{.profile = wave})};
+    d.freewheels = {{"f0", "m0", "m1", Sense::forward, 1000, 0.8, 1.28948}};
+    TorqueSource falls = source("m0", constant(0));
+    falls.name = "falls";
+    falls.waveform.pieces = {{.from = 0, .until = 0.246717, .slope = -100.36},
+                             {.from = 0.246717, .offset = -24.761}};
+    d.sources = {source("m0", constant(14.303)), source("m1", constant(4.3797)), falls};
+    Rig rig(d);
+    rig.run(0.4);
+    EXPECT_EQ(rig.fall_backs, 0);
+    EXPECT_LT(rig.events.size(), 20u);
+    for (const double speed : rig.state.speeds()) EXPECT_EQ(speed, 0);
+}
+
 }  // namespace
 }  // namespace shiftrig::plant
