@@ -76,9 +76,15 @@ struct Event {
     double torque = 0;
     double capacity = 0;  // [Nm] static, sliding where it engages; what the loss of a mesh at rest allows
     double slip = 0;      // [rad/s]
-    // lock: ±1, the sense in which it slipped until then, 0 where nothing pressed it; break_away, reverse: +1 or −1, the sense in which it slips from here on, 0 where others hold it at rest; drive_side: x; flanks:
-    // +1 or −1, which one; engines: speed [rad/s]; facings: temperature [°C]; mesh_releases: 1 where it only passes through rest, 2
-    // (or 3) where others held it, or carry it along; untold: how many
+    // By kind:
+    //   lock                   +1 or −1, the sense in which it slipped until then; 0: nothing pressed it
+    //   engage                 +1 or −1, the sense in which it slips, or pushes at no slip
+    //   break_away, reverse    +1 or −1, the sense in which it slips from here on; 0: others hold it at rest
+    //   mesh_releases          1: it only passes through rest; 2, or 3: it moves, or passes, as others let it
+    //   drive_side             x
+    //   flank_…                +1 or −1, which one
+    //   engine_…, facing_…     speed [rad/s], temperature [°C]
+    //   untold                 how many
     double value = 0;
     // tie_up: bit i of pair `device` + i, which shares the load; the last bit: so do others further away.
     std::uint64_t members = 0;

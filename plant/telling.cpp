@@ -143,7 +143,7 @@ void tell_pair(Work& w, const Mode& mode, int k, unsigned char was, const Sample
 }
 
 // Of meshes those are told that come to rest by their losses. Others hold them as well, or instead, in between.
-void tell_mesh(Work& w, const Mode& mode, int k, unsigned char was, const LossAtRest& at_rest, Sample& s) {
+void tell_mesh(Work& w, const Mode& mode, int k, unsigned char was, const LossAtRest& loss, Sample& s) {
     const int device = w.model.pairs + k;
     const unsigned char is = w.contact[device];
     const Note& note = w.scratch.notes[static_cast<std::size_t>(device)];
@@ -153,8 +153,8 @@ void tell_mesh(Work& w, const Mode& mode, int k, unsigned char was, const LossAt
         if (rests != 0) return;
         rests = 1;
         event.kind = EventKind::mesh_sticks;
-        event.torque = std::fabs(at_rest.needed);
-        event.capacity = at_rest.allowed;
+        event.torque = std::fabs(loss.needed);
+        event.capacity = loss.allowed;
     } else {
         if (mode.bound[device]) return;
         const bool passes = rests == 0 && note.closed && motion_sign(was) != motion_sign(is);
