@@ -65,7 +65,8 @@ ScratchData::ScratchData(const ModelData& m) {
     moves.assign(static_cast<std::size_t>(m.pairs), 0);
     engine_modes.resize(m.engines.size());
     const auto bytes = static_cast<std::size_t>(whole_words(m.contact_bytes));
-    for (auto* list : {&before, &trial, &release, &changed, &violations, &told}) list->assign(bytes, 0);
+    for (auto* list : {&before, &trial, &release, &changed, &violations, &found, &told})
+        list->assign(bytes, 0);
     family.assign(bytes, 0);
     losses.resize(static_cast<std::size_t>(m.meshes));
     notes.resize(static_cast<std::size_t>(m.contact_bytes));

@@ -107,8 +107,8 @@ struct ScratchData {
     std::vector<PistonCourse> pistons;
     std::vector<ValveBefore> piston_valves;
     int moving_count = 0, piston_count = 0;
-    std::vector<EngineMode> engine_modes;                                    // at the beginning of the step
-    std::vector<unsigned char> before, trial, release, changed, violations;  // contact bytes
+    std::vector<EngineMode> engine_modes;  // at the beginning of the step
+    std::vector<unsigned char> before, trial, release, changed, violations, found;  // contact bytes
     std::vector<unsigned char> overcome;  // per pair: broke away in the instant being settled,
     std::vector<unsigned char>
         eased;  // came to hold what it pushed with: exactly at its limit, as near as that is known

@@ -242,7 +242,13 @@ struct Search {
 
     // Notes what was found: the one that gave way comes first, what follows from that after it.
     void note(const unsigned char* found) {
-        if (goes) find_losses(found);
+        // As it is before anything has broken away.
+        LossAtRest* const losses = w.scratch.losses.data();
+        MotionLosses of_motions(w, mode);
+        for (const int k : w.model.lossy_meshes) {
+            const int device = w.model.pairs + k;
+            if (goes && w.contact[device] == stuck && found[device] != stuck) losses[k] = of_motions.of(k, s);
+        }
         const Mode& then = find_mode(w.model, w.operators, found, w.scratch);
         if (gives_way >= 0) note(found, then, gives_way);
         for (int k = 0; k < w.model.first_flank; ++k) {
@@ -261,22 +267,6 @@ struct Search {
             overcome(k) = 1;
         } else {
             note_release(w, k, w.scratch.losses[static_cast<std::size_t>(k - w.model.pairs)]);
-        }
-    }
-    // Of the meshes that go.
-    void find_losses(const unsigned char* found) {
-        int known = -1;  // whose family's losses are there
-        for (const int k : w.model.lossy_meshes) {
-            const int device = w.model.pairs + k;
-            if (w.contact[device] != stuck || found[device] == stuck) continue;
-            const int leader = leader_of(w, mode, k);
-            LossAtRest* const losses = w.scratch.losses.data();
-            if (leader < 0) {
-                losses[k] = loss_at_rest(w, k, s);
-            } else if (leader != known) {
-                family_losses(w, mode, leader, s, losses);
-                known = leader;
-            }
         }
     }
 };
@@ -303,7 +293,7 @@ Rearrangement rearrange(Work& w, int gives_way, int around, Sample& s, bool amon
         search.forget();
         return Rearrangement::none;
     }
-    unsigned char* const states = w.scratch.changed.data();  // to find what losses there are it tries again
+    unsigned char* const states = w.scratch.found.data();  // to find what losses there are it tries again
     std::copy(trial, trial + m.contact_bytes, states);
     search.note(states);
     std::copy(states, states + m.contact_bytes, w.contact);

@@ -217,6 +217,15 @@ int leader_of(Work& w, const Mode& mode, int mesh) SHIFTRIG_REALTIME {
     return -1;
 }
 
+LossAtRest MotionLosses::of(int mesh, Sample& s) SHIFTRIG_REALTIME {
+    const int leader = leader_of(w, mode, mesh);
+    if (leader < 0) return loss_at_rest(w, mesh, s);
+    LossAtRest* const losses = w.scratch.losses.data();
+    if (leader != known) family_losses(w, mode, leader, s, losses);
+    known = leader;
+    return losses[mesh];
+}
+
 double loss_left(const Work& w, int mesh, const Sample& s) SHIFTRIG_REALTIME {
     const LossAtRest loss = loss_at_rest(w, mesh, s);
     return loss.allowed - std::fabs(loss.needed);

@@ -13,6 +13,17 @@ void family_losses(Work& work, const Mode& mode, int leader, Sample& sample,
                    LossAtRest* losses) SHIFTRIG_REALTIME;
 // With whom a stuck mesh moves; −1: others hold it.
 int leader_of(Work& work, const Mode& mode, int mesh) SHIFTRIG_REALTIME;
+// loss_at_rest() of one mesh after the other, as torques of all the losses of its motion where it has one.
+class MotionLosses {
+  public:
+    MotionLosses(Work& work, const Mode& now) : w(work), mode(now) {}
+    LossAtRest of(int mesh, Sample& sample) SHIFTRIG_REALTIME;
+
+  private:
+    Work& w;
+    const Mode& mode;
+    int known = -1;  // the leader whose family's losses are in scratch.losses
+};
 // What is left of the loss that a stuck mesh can take [Nm].
 double loss_left(const Work& work, int mesh, const Sample& sample) SHIFTRIG_REALTIME;
 

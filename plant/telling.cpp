@@ -171,25 +171,6 @@ void tell_mesh(Work& w, const Mode& mode, int k, unsigned char was, const LossAt
     log_event(w, event);
 }
 
-// What meshes at rest need and have, each of its motion.
-class Losses {
-  public:
-    Losses(Work& work, const Mode& now) : w(work), mode(now) {}
-    LossAtRest of(int mesh, Sample& s) {
-        const int leader = leader_of(w, mode, mesh);
-        if (leader < 0) return loss_at_rest(w, mesh, s);
-        LossAtRest* const losses = w.scratch.losses.data();
-        if (leader != known) family_losses(w, mode, leader, s, losses);
-        known = leader;
-        return losses[mesh];
-    }
-
-  private:
-    Work& w;
-    const Mode& mode;
-    int known = -1;
-};
-
 }  // namespace
 
 bool log_event(Work& w, const Event& event) SHIFTRIG_REALTIME {
@@ -238,7 +219,7 @@ void tell_instant(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     scratch.tells_on = true;
     if (!begins && scratch.noted_count == 0 && same_states(told, w.contact, m.contact_bytes)) return;
 
-    Losses losses(w, mode);
+    MotionLosses losses(w, mode);
     const auto tell = [&](int k) {
         if (k < m.pairs) {
             tell_pair(w, mode, k, told[k], s);

@@ -43,9 +43,7 @@ TEST(Explain, AStuckMeshIsToldWithWhatItNeedsAndWhatItsLossAllows) {
     Description d;
     d.name = "gear";
     d.masses = {mass("a", 1, 1), mass("b", 1, 1)};
-    Gear gear;
-    gear.name = "g", gear.a = "a", gear.b = "b", gear.ratio = 1, gear.efficiency = 0.5;
-    d.gears = {gear};
+    d.gears = {lossy_gear("g", "a", "b", 1, 0.5)};
     TorqueSource drive = source("a", constant(10));
     drive.waveform.pieces[0].until = 0.6;
     d.sources = {drive, source("b", constant(-8))};
@@ -63,9 +61,8 @@ TEST(Explain, APairThatBeginsToPressAtRestEngagesAndLocksOnceItHoldsItsShare) {
     d.name = "held";
     d.masses = {mass("m", 1)};
     d.clutches = {
-        clutch("holds", "m", "", 25),
+        held("holds", "m", "", 25),
         clutch("joins", "m", "", 10, 1, ActuationDirect{.profile = {{{.from = 0.01, .slope = 20}}}})};
-    d.clutches[0].initially_locked = true;
     d.sources = {source("m", constant(8))};
     Rig rig(d);
     // Its share is 10/35 of the load, as nominal capacities are: after 11.43 ms.
@@ -116,11 +113,8 @@ TEST(Explain, AMeshThatABrakeHeldIsToldToMoveAgain) {
     Description d;
     d.name = "braked";
     d.masses = {mass("a", 1), mass("b", 3)};
-    Gear gear;
-    gear.name = "g", gear.a = "a", gear.b = "b", gear.ratio = 2, gear.efficiency = 0.9;
-    d.gears = {gear};
-    d.clutches = {clutch("B", "b", "", 50, 1.2)};
-    d.clutches[0].initially_locked = true;
+    d.gears = {lossy_gear("g", "a", "b", 2, 0.9)};
+    d.clutches = {held("B", "b", "", 50, 1.2)};
     TorqueSource drive = source("a", constant(0));
     drive.waveform.pieces = {{.from = 0, .slope = 20}};
     d.sources = {drive};
@@ -134,18 +128,11 @@ TEST(Explain, AMeshThatABrakeHeldIsToldToMoveAgain) {
 
 // Two meshes of one motion, and an axle at rest behind a shaft: each is told with what all the losses of its motion are.
 TEST(Explain, MeshesThatGoTogetherAreToldWithWhatTheirMotionNeeds) {
-    const auto gear = [](const char* name, const char* a, const char* b, double ratio, double efficiency,
-                         double bearing) {
-        Gear g;
-        g.name = name, g.a = a, g.b = b, g.ratio = ratio, g.efficiency = efficiency;
-        g.bearing_torque = bearing;
-        return g;
-    };
     Description d;
     d.name = "axle";
     d.masses = {mass("p1", 0.02), mass("p2", 0.02), mass("o", 0.3), mass("c", 0.1), mass("l", 3)};
-    d.gears = {gear("G1", "p1", "o", 3, 0.97, 0.05), gear("G2", "p2", "o", 2, 0.97, 0.05),
-               gear("AX", "c", "l", 4, 0.95, 1)};
+    d.gears = {lossy_gear("G1", "p1", "o", 3, 0.97, 0.05), lossy_gear("G2", "p2", "o", 2, 0.97, 0.05),
+               lossy_gear("AX", "c", "l", 4, 0.95, 1)};
     Shaft half_shaft;
     half_shaft.name = "s", half_shaft.a = "o", half_shaft.b = "c";
     half_shaft.stiffness = 1000, half_shaft.damping = 1;
@@ -168,9 +155,7 @@ TEST(Explain, AMeshThatOthersCarryThroughRestIsToldSo) {
     Description d;
     d.name = "carried";
     d.masses = {mass("a", 1, 8), mass("b", 1, 4)};
-    Gear gear;
-    gear.name = "G", gear.a = "a", gear.b = "b", gear.ratio = 2, gear.efficiency = 0.9;
-    d.gears = {gear};
+    d.gears = {lossy_gear("G", "a", "b", 2, 0.9)};
     d.clutches = {clutch("B", "b", "", 10)};
     d.sources = {source("a", constant(-50))};
     Rig rig(d);
@@ -189,8 +174,7 @@ TEST(Explain, CausesAreToldBeforeWhatFollows) {
     Waveform applied;
     applied.pieces = {{.from = 0.5, .slope = 1}};
     d.clutches = {clutch("B2", "a", "", 30, 1.1, ActuationDirect{.profile = applied}),
-                  clutch("B1", "a", "", 50, 1.3, ActuationDirect{.profile = released})};
-    d.clutches[1].initially_locked = true;
+                  held("B1", "a", "", 50, 1.3, ActuationDirect{.profile = released})};
     d.sources = {source("a", constant(30))};
     Rig rig(d);
     std::vector<std::string> lines = told(rig, 1.1);
@@ -206,9 +190,7 @@ TEST(Explain, WhatRestsWhereTheAccountBeginsIsTold) {
     Description d;
     d.name = "gear";
     d.masses = {mass("a", 1), mass("b", 1)};
-    Gear gear;
-    gear.name = "g", gear.a = "a", gear.b = "b", gear.ratio = 1, gear.efficiency = 0.5;
-    d.gears = {gear};
+    d.gears = {lossy_gear("g", "a", "b", 1, 0.5)};
     d.sources = {source("a", constant(10)), source("b", constant(-8))};
     Rig rig(d);
     const std::vector<std::string> rests = {

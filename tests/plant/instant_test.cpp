@@ -7,22 +7,6 @@
 namespace shiftrig::plant {
 namespace {
 
-Clutch held(const char* name, const char* a, const char* b, double sliding, double static_ratio,
-            Actuation actuation = ActuationConstant{}) {
-    Clutch c = clutch(name, a, b, sliding, static_ratio, std::move(actuation));
-    c.initially_locked = true;
-    return c;
-}
-
-Gear gear(const char* name, const char* a, const char* b, double ratio, double efficiency,
-          double backward_efficiency = 0, double bearing_torque = 0) {
-    Gear g;
-    g.name = name, g.a = a, g.b = b, g.ratio = ratio;
-    g.efficiency = efficiency, g.backward_efficiency = backward_efficiency;
-    g.bearing_torque = bearing_torque;
-    return g;
-}
-
 // A clutch of 10 Nm, a gear of η = 0.8 and a brake that holds 8.82 Nm and passes 6.3: no more than 8 Nm ever come to it. Where the
 // clutch gave way a little below its limit it slipped backwards, and the brake was taken to go in its place.
 TEST(Instant, ABrakeWithinItsLimitStaysWhereTheClutchBeforeItSlips) {
@@ -32,7 +16,7 @@ TEST(Instant, ABrakeWithinItsLimitStaysWhereTheClutchBeforeItSlips) {
                 Description d;
                 d.method = method;
                 d.masses = {mass("m0", 0.2), mass("m1", 0.2), mass("m2", 0.2)};
-                d.gears = {gear("g", "m1", "m2", 1, 0.8)};
+                d.gears = {lossy_gear("g", "m1", "m2", 1, 0.8)};
                 d.clutches = {held("c", "m0", "m1", 10, 1), held("b", "m2", "", 6.3, 1.4)};
                 Waveform load;
                 load.pieces = {{.amplitude = 15, .frequency = frequency}};
@@ -56,7 +40,7 @@ TEST(Instant, ABrakeWithinItsLimitStaysWhereTheClutchBeforeItSlips) {
 TEST(Instant, ALastHolderAtItsLimitLetsAllGo) {
     Description d;
     d.masses = {mass("m0", 1.7237), mass("m1", 0.2436, -9.593)};
-    d.gears = {gear("g0", "m1", "m0", 1.34744, 0.60927, 0.86612, 0.1416)};
+    d.gears = {lossy_gear("g0", "m1", "m0", 1.34744, 0.60927, 0.1416, 0.86612)};
     d.clutches = {clutch("b0", "m1", "", 3.992, 1.164), clutch("b1", "m0", "", 4.1924)};
     Waveform load;
     load.pieces = {{.amplitude = 15.48, .frequency = 6.988, .phase_time = 0.03021}};
@@ -80,8 +64,8 @@ TEST(Instant, NoOtherBrakeIsTornLooseThatCouldHold) {
     for (const bool reversed : {false, true}) {
         Description d;
         d.masses = {mass("m0", 0.0561228), mass("m1", 1.98783), mass("m2", 0.150015), mass("m3", 0.862237)};
-        d.gears = {gear("g0", "m0", "m2", 1.97882, 0.68584, 0.702905),
-                   gear("g1", "m0", "m3", -2.13541, 0.809878, 0.696518)};
+        d.gears = {lossy_gear("g0", "m0", "m2", 1.97882, 0.68584, 0, 0.702905),
+                   lossy_gear("g1", "m0", "m3", -2.13541, 0.809878, 0, 0.696518)};
         if (reversed) std::swap(d.gears[0], d.gears[1]);
         Shaft s;
         s.name = "s0", s.a = "m0", s.b = "m1";
@@ -158,7 +142,7 @@ TEST(Instant, OfTwoPressedFromNothingTheWeakerOneGoes) {
 TEST(Instant, RoundingInANearlyParallelLoopIsNoMotion) {
     Description d;
     d.masses = {mass("m0", 0.12432, 5.9424), mass("m1", 0.15212, 5.9587)};
-    d.gears = {gear("g0", "m0", "m1", 0.997266, 1)};
+    d.gears = {lossy_gear("g0", "m0", "m1", 0.997266, 1)};
     const auto pressed = [](double at_first, double slope_at_first, double later, double slope_later) {
         Waveform w;
         w.pieces = {{.from = 0, .until = 0.126451, .offset = at_first, .slope = slope_at_first},

@@ -26,6 +26,14 @@ inline Clutch clutch(const std::string& name, const std::string& a, const std::s
     return c;
 }
 
+// Locked where a run begins.
+inline Clutch held(const std::string& name, const std::string& a, const std::string& b, double capacity,
+                   double static_ratio = 1, Actuation actuation = ActuationConstant{}) {
+    Clutch c = clutch(name, a, b, capacity, static_ratio, std::move(actuation));
+    c.initially_locked = true;
+    return c;
+}
+
 // Of the reference tractor.
 inline WetPlates powershift_plates() {
     WetPlates p;
@@ -50,7 +58,7 @@ inline Oil reference_oil() {
 }
 
 inline Gear lossy_gear(const std::string& name, const std::string& a, const std::string& b, double ratio,
-                       double efficiency, double bearing) {
+                       double efficiency, double bearing = 0, double backward_efficiency = 0) {
     Gear gear;
     gear.name = name;
     gear.a = a;
@@ -58,6 +66,7 @@ inline Gear lossy_gear(const std::string& name, const std::string& a, const std:
     gear.ratio = ratio;
     gear.efficiency = efficiency;
     gear.bearing_torque = bearing;
+    gear.backward_efficiency = backward_efficiency;
     return gear;
 }
 

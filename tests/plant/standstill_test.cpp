@@ -83,12 +83,6 @@ TEST(Standstill, ABrakeHoldsWhatTheLossesOfItsGearLeaveIt) {
     EXPECT_NEAR(both.forward.state.speeds()[2], -10.2875, 1e-4);
 }
 
-Clutch held(const char* name, const char* a, const char* b, double sliding, double static_ratio = 1) {
-    Clutch c = clutch(name, a, b, sliding, static_ratio);
-    c.initially_locked = true;
-    return c;
-}
-
 // The one at its limit is just below it in the split of minimum norm; nobody else is, and it breaks away all the same.
 TEST(Standstill, FourBrakesAroundARow) {
     Description d;

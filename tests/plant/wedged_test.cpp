@@ -10,13 +10,6 @@
 namespace shiftrig::plant {
 namespace {
 
-Clutch closed(const char* name, const char* a, const char* b, double sliding, double static_ratio = 1,
-              Actuation actuation = ActuationConstant{}) {
-    Clutch c = clutch(name, a, b, sliding, static_ratio, std::move(actuation));
-    c.initially_locked = true;
-    return c;
-}
-
 Waveform rising(double slope, double from) {
     return {{{.from = from, .slope = slope}}};
 }
@@ -26,7 +19,7 @@ Description two_brakes(Method method, double static_ratio) {
     Description d;
     d.method = method;
     d.masses = {mass("w", 1)};
-    d.clutches = {closed("park", "w", "", 10),
+    d.clutches = {held("park", "w", "", 10),
                   clutch("service", "w", "", 100, static_ratio, ActuationApply{.lag = 0.15})};
     d.sources = {source("w", constant(8))};
     return d;
@@ -72,9 +65,8 @@ TEST(Wedged, TheNextStepRuleAsksAtTheEndsOfSteps) {
 Description ring(Actuation third) {
     Description d;
     d.masses = {mass("m1", 1), mass("m2", 1), mass("m6", 1)};
-    d.clutches = {closed("ground", "m2", "", 100),
-                  closed("c3", "m2", "m1", 20, 1.3, ActuationDirect{{}, 0.5}), closed("c7", "m2", "m6", 4),
-                  clutch("c12", "m6", "m1", 4, 1, std::move(third))};
+    d.clutches = {held("ground", "m2", "", 100), held("c3", "m2", "m1", 20, 1.3, ActuationDirect{{}, 0.5}),
+                  held("c7", "m2", "m6", 4), clutch("c12", "m6", "m1", 4, 1, std::move(third))};
     d.sources = {source("m1", constant(-11.8)), source("m6", constant(-3.9))};
     return d;
 }
@@ -99,7 +91,7 @@ TEST(Wedged, ALoadThatTurnsAtOnceTurnsThePush) {
             d.method = method;
             d.transition = transition;
             d.masses = {mass("m", 1)};
-            d.clutches = {closed("A", "m", "", 100, 1, ActuationDirect{{}, 0.1}), closed("C", "m", "", 100)};
+            d.clutches = {held("A", "m", "", 100, 1, ActuationDirect{{}, 0.1}), held("C", "m", "", 100)};
             Waveform load = constant(60, -1e300, 0.02);
             load.pieces.push_back({.from = 0.02, .offset = -60});
             d.sources = {source("m", load)};
@@ -124,8 +116,8 @@ TEST(Wedged, ACapacityThatDipsLetsGoAndHoldsOnce) {
                 d.masses = {mass("m", 1)};
                 Waveform wave = sine(0.4, frequency);
                 wave.pieces.push_back({.offset = 0.5});
-                d.clutches = {closed("A", "m", "", 100, 1, ActuationDirect{.profile = wave}),
-                              closed("C", "m", "", 100)};
+                d.clutches = {held("A", "m", "", 100, 1, ActuationDirect{.profile = wave}),
+                              held("C", "m", "", 100)};
                 d.sources = {source("m", constant(2 * (10 + depth)))};
                 Rig rig(d);
                 rig.run(1);
@@ -141,7 +133,7 @@ TEST(Wedged, ACapacityThatDipsLetsGoAndHoldsOnce) {
 // Where another one gives way at last, the one that pushed holds what it pushed with: it goes on from there.
 TEST(Wedged, WhatPushesHoldsWhatAnotherOneLeavesIt) {
     Description d = ring(ActuationDirect{.profile = rising(10, 0.02)});
-    d.clutches[1] = closed("c3", "m2", "m1", 10, 1.3);
+    d.clutches[1] = held("c3", "m2", "m1", 10, 1.3);
     const Both both(d, 0.12);
     both.expect_mirror_images();
     const std::vector<double> breaks = both.forward.times(EventKind::break_away, "c7");
@@ -159,8 +151,8 @@ TEST(Wedged, WhatIsTornLooseAtNoCapacityKeepsItsSense) {
     d.masses = {mass("m1", 0.04), mass("m2", 0.02), mass("m6", 0.03), mass("m8", 2.2)};
     Waveform weakens = constant(1, -1e300, 0.021);
     weakens.pieces.push_back({.from = 0.021, .offset = 0.3});
-    d.clutches = {closed("c3", "m2", "m1", 25), closed("c7", "m2", "m6", 5.7),
-                  closed("c9", "m2", "m8", 5, 1, ActuationDirect{.profile = weakens}),
+    d.clutches = {held("c3", "m2", "m1", 25), held("c7", "m2", "m6", 5.7),
+                  held("c9", "m2", "m8", 5, 1, ActuationDirect{.profile = weakens}),
                   clutch("c12", "m6", "m1", 3.6, 1, ActuationDirect{.profile = rising(13, 0.021)})};
     d.sources = {source("m2", constant(4.9))};
     const Both early(d, 0.024), late(d, 0.2);

@@ -295,8 +295,7 @@ TEST(Freewheel, OneThatIsLetGoUnderLoadIsSaidToHaveBeenLoaded) {
     d.freewheels = {freewheel("F", "drive", "driven", 500)};
     Waveform fails = constant(1, -1e300, 0.05);
     fails.pieces.push_back({.from = 0.05, .offset = 1. / 3});
-    d.clutches = {clutch("B", "driven", "", 60, 1, ActuationDirect{.profile = fails})};
-    d.clutches[0].initially_locked = true;
+    d.clutches = {held("B", "driven", "", 60, 1, ActuationDirect{.profile = fails})};
     d.sources = {source("drive", constant(10)), source("driven", constant(40))};
     Rig rig(d);
     rig.run(0.1);
