@@ -13,7 +13,7 @@ set(MULTICAST ${CMAKE_SOURCE_DIR}/tests/io/with_multicast.sh)
 add_test(NAME two_processes_on_lcm COMMAND ${MULTICAST} ${TWO_PROCESSES} lcm:udpm://239.255.76.67:7667?ttl=0)
 add_test(NAME two_processes_on_udpcan COMMAND ${MULTICAST} ${TWO_PROCESSES} udpcan:239.74.163.2:43113)
 
-add_test(NAME run_command_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/run_command_test.py
-  $<TARGET_FILE:shiftrig> $<TARGET_FILE:shiftrig-tcu> ${CMAKE_SOURCE_DIR}/config)
-add_test(NAME told_events_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/told_events_test.py
-  $<TARGET_FILE:shiftrig> ${CMAKE_SOURCE_DIR}/config)
+foreach(subject run_command bad_input told_events)
+  add_test(NAME ${subject}_test COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/${subject}_test.py
+    $<TARGET_FILE:shiftrig> $<TARGET_FILE:shiftrig-tcu> ${CMAKE_SOURCE_DIR}/config)
+endforeach()

@@ -1,26 +1,14 @@
 """What changed in a run, as `shiftrig run --json` and `shiftrig explain` tell it.
 
-usage: told_events_test.py SHIFTRIG CONFIG
+usage: told_events_test.py SHIFTRIG SHIFTRIG_TCU CONFIG
 """
 import csv
 import json
-import subprocess
 import sys
 import unittest
 
 from in_a_folder import Folder
-
-SHIFTRIG, CONFIG = sys.argv[1:3]
-
-
-def command(*arguments):
-    return subprocess.run([SHIFTRIG, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=240)
-
-
-def free(*arguments, scenario=CONFIG + "/scenarios/plough_upshift.yaml"):
-    done = command("run", "--scenario", scenario, "--pace", "free", "--json", *arguments)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+from programs import CONFIG, command, free
 
 
 class Told(Folder):
