@@ -8,7 +8,7 @@ target_link_libraries(reference_solver_test PRIVATE shiftrig_reference GTest::gt
 target_compile_definitions(reference_solver_test PRIVATE SHIFTRIG_DATA="${CMAKE_SOURCE_DIR}/tests/data")
 gtest_discover_tests(reference_solver_test)
 
-add_library(shiftrig_comparison STATIC plant/random_systems.cpp plant/random_forests.cpp plant/random_vehicles.cpp plant/random_pistons.cpp plant/comparison.cpp plant/tractor_comparison.cpp)
+add_library(shiftrig_comparison STATIC plant/random_systems.cpp plant/random_forests.cpp plant/random_vehicles.cpp plant/random_wet_vehicles.cpp plant/random_pistons.cpp plant/comparison.cpp plant/tractor_comparison.cpp)
 target_link_libraries(shiftrig_comparison PUBLIC shiftrig_reference shiftrig_plant)
 
 # Thousands by hand: shiftrig_random_systems --count 10000 --seed 1 --seconds 0.2 --jobs 2
