@@ -69,6 +69,62 @@ int exponent(const ModelData& m, const Mode& mode, int mesh) {
     return key == 0 ? 0 : key == 2 ? -1 : 1;
 }
 
+// Of dependent rows: Gᵀ = Q Lᵀ, Q (rows × rank) with orthonormal columns, so that G⁺ = Q L⁻¹ without G Gᵀ, in which weights far
+// apart would cost twice the digits. Leaves Q, and L⁻¹ times the right sides in their place; `lower` is for L.
+void share_out(const Mode& mode, const double* g, double* q, double* lower, double* right, int columns) {
+    const int rows = mode.row_count, rank = mode.rank;
+    for (int k = 0; k < rank; ++k) {
+        double* const v = q + k * rows;
+        double* const l = lower + k * rank;  // a row of L
+        for (int r = 0; r < rows; ++r) v[r] = g[r * rank + k];
+        std::fill(l, l + rank, 0.);
+        for (int pass = 0; pass < 2; ++pass) {  // twice is enough
+            for (int other = 0; other < k; ++other) {
+                const double part = dot(q + other * rows, v, rows);
+                l[other] += part;
+                add_scaled(v, -part, q + other * rows, rows);
+            }
+        }
+        l[k] = std::sqrt(dot(v, v, rows));
+        for (int r = 0; r < rows; ++r) v[r] = l[k] == 0 ? 0 : v[r] / l[k];
+    }
+    for (int j = 0; j < columns; ++j) {
+        double* const x = right + j * rank;
+        for (int k = 0; k < rank; ++k) {
+            const double* const l = lower + k * rank;
+            x[k] = l[k] == 0 ? 0 : (x[k] - dot(l, x, k)) / l[k];
+        }
+    }
+}
+
+// Of a row that the others cannot replace (Q Qᵀ)_rr = 1; less means that it shares its load, with those where (Q Qᵀ)_rs is not 0:
+// they are in one loop.
+void find_loops(const ModelData& m, Mode& mode, const double* q, int* joined) {
+    const int rows = mode.row_count;
+    const auto share = [&](int r, int other) {
+        double sum = 0;
+        for (int k = 0; k < mode.rank; ++k) sum += q[k * rows + r] * q[k * rows + other];
+        return sum;
+    };
+    for (int r = 0; r < rows; ++r) joined[r] = r;  // to which earlier row of its loop each row
+    const auto root = [joined](int r) {
+        while (joined[r] != r) r = joined[r];
+        return r;
+    };
+    for (int r = 0; r < rows; ++r) {
+        if (mode.rows[r] >= m.pairs || share(r, r) >= 1 - 1e-9) continue;
+        mode.bound[mode.rows[r]] |= shares_load;
+        for (int other = 0; other < rows; ++other) {
+            if (other == r || std::fabs(share(r, other)) < 1e-9) continue;
+            const int one = root(r), two = root(other);
+            joined[std::max(one, two)] = std::min(one, two);
+        }
+    }
+    for (int r = 0; r < mode.first_mesh; ++r) {
+        if (mode.bound[mode.rows[r]] & shares_load) mode.loop[mode.rows[r]] = root(r) + 1;
+    }
+}
+
 }  // namespace
 
 void set_loss_shares(const ModelData& m, Mode& mode) SHIFTRIG_REALTIME {
@@ -216,7 +272,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
     for (int r = 0; r < rows; ++r) {
         const int unknown = mode.rows[r];
         double* c = force + r * n;
-        double length, weight = mesh_weight;
+        double length, weight = 0;
         if (unknown < m.pairs) {
             const FrictionPair& pair = s.pairs[static_cast<std::size_t>(unknown)];
             length = scaled_column(m, pair.links, c);
@@ -224,10 +280,11 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
         } else if (unknown < m.pairs + m.meshes) {
             const Mesh& mesh = s.meshes[static_cast<std::size_t>(unknown - m.pairs)];
             length = scaled_column(m, mesh.column(mesh.force_ratio(exponent(m, mode, unknown - m.pairs))), c);
+            weight = mesh_weight * mesh.first_link_weight();
         } else {
             const Mesh& mesh = s.meshes[static_cast<std::size_t>(unknown - m.pairs - m.meshes)];
             length = scaled_column(m, mesh.loss(), c);
-            weight = s.loss_weight();
+            weight = s.loss_weight() * mesh.first_link_weight();
         }
         // c is a unit column; the true one is length·c. Work with √W·length·c in the dependent case.
         scale[r] = mode.redundant ? std::sqrt(weight) : 1 / length;
@@ -250,43 +307,14 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
             for (int r = 0; r < rows; ++r) transmission[j * rows + r] = scale[r] * right[j * rank + r];
         }
     } else {
-        for (int k = 0; k < rank; ++k) {
-            for (int l = 0; l < rank; ++l) {
-                double sum = 0;
-                for (int r = 0; r < rows; ++r) sum += g[r * rank + k] * g[r * rank + l];
-                square[l * rank + k] = sum;
-            }
-        }
-        // A row that the others cannot replace has gᵀ(G Gᵀ)⁻¹g = 1; less means that it shares its load, with those where this
-        // product of both is not 0: they are in one loop.
-        double* factor = transmission;  // not yet in use
-        int* const joined = integers;   // to which earlier row of its loop each row
-        for (int r = 0; r < rows; ++r) joined[r] = r;
-        const auto root = [joined](int r) {
-            while (joined[r] != r) r = joined[r];
-            return r;
-        };
-        for (int r = 0; r < rows; ++r) {
-            if (mode.rows[r] >= m.pairs) continue;
-            std::copy(square, square + rank * rank, factor);
-            std::copy(g + r * rank, g + (r + 1) * rank, column);
-            solve(factor, rank, column, 1);
-            if (dot(g + r * rank, column, rank) >= 1 - 1e-9) continue;
-            mode.bound[mode.rows[r]] |= shares_load;
-            for (int other = 0; other < rows; ++other) {
-                if (other == r || std::fabs(dot(g + other * rank, column, rank)) < 1e-9) continue;
-                const int one = root(r), two = root(other);
-                joined[std::max(one, two)] = std::min(one, two);
-            }
-        }
-        for (int r = 0; r < mode.first_mesh; ++r) {
-            if (mode.bound[mode.rows[r]] & shares_load) mode.loop[mode.rows[r]] = root(r) + 1;
-        }
-        solve(square, rank, right, n);
+        share_out(mode, g, square, transmission, right, n);
+        find_loops(m, mode, square, integers);
         for (int j = 0; j < n; ++j) {
-            for (int r = 0; r < rows; ++r) {
-                transmission[j * rows + r] = scale[r] * dot(g + r * rank, right + j * rank, rank);
-            }
+            double* const column_of = transmission + j * rows;
+            std::fill(column_of, column_of + rows, 0.);
+            for (int k = 0; k < rank; ++k)
+                add_scaled(column_of, right[j * rank + k], square + k * rows, rows);
+            for (int r = 0; r < rows; ++r) column_of[r] *= scale[r];
         }
     }
 

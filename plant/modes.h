@@ -11,7 +11,7 @@
 //
 // T̂ = G⁺ Qᵀ J^(−1/2), G = Qᵀ J^(−1/2) Ĉ, and Q an orthonormal basis of J^(−1/2) C: dependent rows (tie-up)
 // fall away by themselves; G⁺ is then the minimum-norm inverse weighted with the nominal capacities, of meshes
-// Structure::mesh_weight(), of losses at rest 1e-6 of that.
+// Structure::mesh_weight(), of losses at rest 1e-10 of that.
 #pragma once
 
 #include <cstdint>

@@ -165,13 +165,14 @@ bool set_up(const Work& w, RestProblem& rest) {
 }
 
 // How much each joint gives where loads are shared out: the less the larger its weight. Pairs weigh what they nominally hold.
-void set_gives(const ModelData& m, RestProblem& rest, double mesh_weight, double RestJoint::*give) {
+void set_gives(const Work& w, RestProblem& rest, double mesh_weight, double RestJoint::*give) {
+    const ModelData& m = w.model;
     double most = 0;
     for (int i = 0; i < rest.count; ++i) {
         RestJoint& joint = rest.joints[i];
         const double weight = joint.mesh < 0
                                   ? m.structure.pairs[static_cast<std::size_t>(joint.device)].nominal_capacity
-                                  : mesh_weight;
+                                  : mesh_weight * mesh_of(w, joint.mesh).first_link_weight();
         joint.*give = 1 / (weight * joint.scale * joint.scale);
         most = std::max(most, joint.*give);
     }
@@ -205,8 +206,8 @@ bool pose_rest_problem(Work& w, const Mode& mode, int around, Sample& s,
     free_torques(w, mode, s, rest.free);
     const bool posed = mode.tree ? set_up_trains(w, piece, rest) : set_up(w, rest);
     if (posed) {
-        set_gives(m, rest, m.structure.loss_weight(), &RestJoint::give);
-        set_gives(m, rest, m.structure.mesh_weight(), &RestJoint::give_on_losses);
+        set_gives(w, rest, m.structure.loss_weight(), &RestJoint::give);
+        set_gives(w, rest, m.structure.mesh_weight(), &RestJoint::give_on_losses);
     }
     contact_forces(w, w.contact, s);
     return posed;
@@ -215,6 +216,10 @@ bool pose_rest_problem(Work& w, const Mode& mode, int around, Sample& s,
 bool solve_rest_problem(Split split, RestProblem& rest) SHIFTRIG_REALTIME {
     const int count = rest.count, meshes = rest.mesh_rows, size = rest.size(), columns = lemke_columns(size);
     const auto row_of = [&](const double* matrix, int i) { return matrix + i * count; };
+    // Of the mirror image loads change their sign, and limits their sides.
+    const double sense = rest.mirrored ? -1 : 1;
+    const auto upper = [&](const RestJoint& joint) { return rest.mirrored ? -joint.lower : joint.upper; };
+    const auto lower = [&](const RestJoint& joint) { return rest.mirrored ? -joint.upper : joint.lower; };
     // (I − H C) y = H M_0 + o + δ v − p, where M = M_0 + C y and H holds the slopes.
     for (int i = 0; i < count; ++i) {
         const RestJoint& joint = rest.joints[i];
@@ -224,7 +229,7 @@ bool solve_rest_problem(Split split, RestProblem& rest) SHIFTRIG_REALTIME {
             rest.inverse[j * count + i] = i == j ? 1 : 0;
         }
         rest.inverse[count * count + i] =
-            joint.upper + (joint.mesh < 0 ? 0 : joint.slope * rest.mesh[joint.row]);
+            upper(joint) + (joint.mesh < 0 ? 0 : joint.slope * sense * rest.mesh[joint.row]);
     }
     solve(rest.left, count, rest.inverse, count + 1);
     std::copy(rest.inverse + count * count, rest.inverse + count * (count + 1), rest.y);
@@ -249,7 +254,7 @@ bool solve_rest_problem(Split split, RestProblem& rest) SHIFTRIG_REALTIME {
         rest.torque[i] = 0;
         largest = std::max({largest, std::fabs(rest.b[i]) / joint.scale, std::fabs(rest.y[i]) * joint.scale});
         if (joint.mesh < 0) continue;
-        rest.torque[i] = rest.mesh[joint.row];
+        rest.torque[i] = sense * rest.mesh[joint.row];
         for (int j = 0; j < count; ++j) {
             rest.torque[i] += rest.mesh[(1 + j) * meshes + joint.row] * rest.y[j];
             rest.turn[i * count + j] = turns(joint.row, j);
@@ -275,7 +280,7 @@ bool solve_rest_problem(Split split, RestProblem& rest) SHIFTRIG_REALTIME {
             row[columns - 1] = constant * unit / largest;
             return row;
         };
-        double acceleration = rest.b[i];
+        double acceleration = sense * rest.b[i];
         for (int j = 0; j < count; ++j) acceleration -= mobility(i, j) * rest.y[j];
         double* const slip = set_row(
             i,
@@ -287,7 +292,7 @@ bool solve_rest_problem(Split split, RestProblem& rest) SHIFTRIG_REALTIME {
             acceleration, 1 / joint.scale);
         slip[size + count + i] = -1;  // β
         const double *const response = row_of(rest.response, i), *const turn = row_of(rest.turn, i);
-        double low = joint.lower;
+        double low = lower(joint);
         if (bend >= 0) low += joint.slope * rest.torque[i];
         double* const room = set_row(
             count + i, [&](int j) { return response[j] - (bend < 0 ? 0 : joint.slope * turn[j]); },
@@ -319,6 +324,10 @@ bool solve_rest_problem(Split split, RestProblem& rest) SHIFTRIG_REALTIME {
             }
         }
     }
+    for (int i = 0; i < count; ++i) {
+        rest.y[i] *= sense;
+        rest.torque[i] *= sense;
+    }
     return true;
 }
 
@@ -332,7 +341,7 @@ int side_of(const RestProblem& rest, int i, double& going) SHIFTRIG_REALTIME {
     }
     going = std::max({forward, backward, 0.});
     if (forward < 0 && backward < 0) return 0;
-    return forward >= backward ? 1 : -1;
+    return (forward >= backward) != rest.mirrored ? 1 : -1;
 }
 
 unsigned char state_of(const RestProblem& rest, int i, int side) SHIFTRIG_REALTIME {

@@ -50,7 +50,8 @@ struct RestProblem {
     Piece piece;
     RestJoint joints[most_joints];
     int count = 0, bends = 0;
-    int mesh_rows = 0;  // of `mesh`: all meshes; on a tree those at rest
+    bool mirrored = false;  // solve the mirror image, and mirror what comes out
+    int mesh_rows = 0;      // of `mesh`: all meshes; on a tree those at rest
     int basis[4 * most_joints];
     double* free = nullptr;    // J^(−1/2) M̃, then per joint −J^(−1/2) ĉ; masses × (1 + joints)
     double* motion = nullptr;  // J^(−1/2) c, masses × joints

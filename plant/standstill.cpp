@@ -107,8 +107,18 @@ struct Search {
         return slips(was) ? was : slipping(opening_sense(w, joint.device, carried[i], s));
     }
 
-    bool solve_exactly() {
-        // In a corner that many splits share the exact problem may lead nowhere; that little give does not matter then.
+    // Of the slips, if nothing held them, the one that would grow most, in proportion: backward?
+    bool leans_backward() const {
+        double most = 0;
+        for (int i = 0; i < rest.count; ++i) {
+            const double share = rest.b[i] / rest.joints[i].scale;
+            if (std::fabs(share) > std::fabs(most)) most = share;
+        }
+        return most < 0;
+    }
+    // In a corner that many splits share the exact problem may lead nowhere; that little give does not matter then.
+    bool solve_exactly(bool mirrored) {
+        rest.mirrored = mirrored;
         if (!solve(Split::any) && !solve(Split::as_modes)) return false;
         goes = false;
         for (int i = 0; i < rest.count; ++i) {
@@ -119,6 +129,11 @@ struct Search {
             goes = goes || going[i];
         }
         return true;
+    }
+    // Where large losses make rest and motion both a solution, which one is found hangs on signs. What may rest either way rests.
+    bool solve_exactly() {
+        const bool backward = leans_backward();
+        return (rest.bends > 0 && solve_exactly(!backward) && !goes) || solve_exactly(backward);
     }
 
     template <typename StateOf>

@@ -178,8 +178,9 @@ void StaticsSolver::solve_torques() {
     Eigen::VectorXd weight = Eigen::VectorXd::Ones(unknowns);
     for (Eigen::Index k = 0; k < devices; ++k) {
         const auto& member = set_.members[static_cast<std::size_t>(k)];
-        if (member.kind != RigidSet::Kind::pair) continue;
-        weight[k] = structure_.pairs[static_cast<std::size_t>(member.index)].nominal_capacity / of_mesh;
+        const auto i = static_cast<std::size_t>(member.index);
+        if (member.kind == RigidSet::Kind::pair) weight[k] = structure_.pairs[i].nominal_capacity / of_mesh;
+        if (member.kind == RigidSet::Kind::mesh) weight[k] = structure_.meshes[i].first_link_weight();
     }
     const Eigen::VectorXd root = weight.cwiseSqrt();
     const Eigen::VectorXd row =

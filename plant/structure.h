@@ -21,6 +21,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 #include <string>
 #include <string_view>
@@ -82,6 +83,9 @@ struct Mesh {
     }
     // How a loss torque, referred to the first link, acts on the masses.
     std::array<Link, 2> loss() const noexcept { return {Link{second, ratio}, Link{carrier, -ratio}}; }
+    // Where torques are shared out, those of a mesh count half way between its links, as |u|^½ M_1, whichever is called the
+    // first: the weight of M_1 is so much of the weight of that.
+    double first_link_weight() const noexcept { return 1 / std::fabs(ratio); }
     // M_1, moving forward, at which the loss lines of both directions cross: the first link drives above it. Lines that are
     // parallel do not: bearing friction alone is overcome by either link, half of it by each at this torque. [Nm]
     double loss_kink() const noexcept {
@@ -116,14 +120,14 @@ struct Structure {
 
     int masses() const noexcept { return static_cast<int>(inertia.size()); }
     // Where closed loops leave torques open they are shared by minimum norm, each weighted: a pair by its nominal capacity, a
-    // mesh by this, since sharing is for friction pairs [Nm].
+    // mesh by this times Mesh::first_link_weight(), since sharing is for friction pairs [Nm].
     double mesh_weight() const noexcept {
         double heaviest = 0;
         for (const FrictionPair& pair : pairs) heaviest = std::max(heaviest, pair.nominal_capacity);
-        return 1e3 * (heaviest > 0 ? heaviest : 1);
+        return 1e7 * (heaviest > 0 ? heaviest : 1);
     }
     double loss_weight() const noexcept {
-        return 1e-6 * mesh_weight();
+        return 1e-10 * mesh_weight();
     }                                                // of the loss torque of a mesh at rest
     int mass(std::string_view name) const noexcept;  // index, or −1
     int pair(std::string_view name) const noexcept;  // index, or −1

@@ -48,6 +48,31 @@ TEST(ClosedLoop, ARingComesToRestWithoutTorqueInIt) {
     }
 }
 
+// Two ways from a to b, one through a slow shaft: they share by what their clutches hold, A = T·16 W_A/(16 W_A + W_B), whichever link
+// of a gear is called the first, and however many rigid gears stand in the way.
+TEST(ClosedLoop, GearsHaveNoSayInWhatIsShared) {
+    const auto gear = [](const std::string& first, const std::string& second, double ratio, bool swapped) {
+        return swapped ? lossy_gear(first + second, second, first, 1 / ratio, 1)
+                       : lossy_gear(first + second, first, second, ratio, 1);
+    };
+    double shared[8] = {};
+    for (int i = 0; i < 8; ++i) {
+        Description d;
+        d.name = "two ways";
+        d.method = Method::etd3;
+        for (const char* name : {"a", "x", "y", "b", "z"}) d.masses.push_back(mass(name, 1));
+        d.clutches = {held("A", "a", "b", 100), held("B", "x", "y", 400)};
+        d.gears = {gear("a", "x", 4, i & 1), gear("y", "z", 0.25, i & 2), gear("z", "b", 1, i & 4)};
+        d.sources = {source("a", constant(50)), source("b", constant(-50))};
+        Rig rig(d);
+        rig.run(0.01);
+        shared[i] = rig.out("clutch.A.torque");
+        EXPECT_NEAR(shared[i], 40, 1e-4);
+        EXPECT_NEAR(rig.out("clutch.B.torque"), 4 * (50 - shared[i]), 1e-9);
+        EXPECT_NEAR(shared[i], shared[0], 1e-10);
+    }
+}
+
 std::vector<Event> tie_ups(const Rig& rig) {
     std::vector<Event> list;
     std::copy_if(rig.events.begin(), rig.events.end(), std::back_inserter(list),

@@ -52,7 +52,7 @@ TEST(Instant, ALastHolderAtItsLimitLetsAllGo) {
         both.expect_mirror_images();
         for (const char* brake : {"b0", "b1"})
             ASSERT_EQ(both.forward.times(EventKind::break_away, brake).size(), 1u) << h;
-        EXPECT_NEAR(both.forward.times(EventKind::break_away, "b0")[0], 0.33351209, 1e-8) << h;
+        EXPECT_NEAR(both.forward.times(EventKind::break_away, "b0")[0], 0.33350609, 1e-8) << h;
         EXPECT_NEAR(both.forward.times(EventKind::break_away, "b1")[0], 0.33358084, 1e-8) << h;
         EXPECT_NEAR(both.forward.times(EventKind::mesh_releases, "g0").back(), 0.33358084, 1e-8) << h;
     }
@@ -81,7 +81,7 @@ TEST(Instant, NoOtherBrakeIsTornLooseThatCouldHold) {
         both.expect_mirror_images();
         const Rig& rig = both.forward;
         ASSERT_EQ(rig.times(EventKind::break_away, "b1").size(), 1u) << reversed;
-        EXPECT_NEAR(rig.times(EventKind::break_away, "b1")[0], 0.0948374, 1e-6) << reversed;
+        EXPECT_NEAR(rig.times(EventKind::break_away, "b1")[0], 0.0948392, 1e-6) << reversed;
         EXPECT_EQ(rig.times(EventKind::break_away, "b0").size(), 1u) << reversed;
         EXPECT_NEAR(rig.times(EventKind::break_away, "b0")[0], 0.0987599, 1e-6) << reversed;
         EXPECT_NEAR(rig.times(EventKind::mesh_releases, "g0").back(), 0.0987599, 1e-6) << reversed;
