@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "plant/few.h"
 #include "plant/modes.h"
 #include "plant/tree.h"
 #include "tests/plant/kernel_kinds.h"
@@ -74,7 +75,8 @@ class TreeKernelsOf : public testing::TestWithParam<KernelKind> {
             const ModelData& m = model.data();
             Operators operators(model);
             Scratch scratch(model);
-            std::vector<unsigned char> contact(static_cast<std::size_t>(m.contact_bytes), free_running);
+            std::vector<unsigned char> contact(static_cast<std::size_t>(whole_words(m.contact_bytes)), 0);
+            std::fill_n(contact.begin(), m.contact_bytes, static_cast<unsigned char>(free_running));
             for (int k = 0; n % 4 == 3 && k < m.pairs; ++k)
                 contact[static_cast<std::size_t>(k)] = random() % 4 == 0 ? locked : free_running;
             const Mode& mode = find_mode(m, operators.data(), contact.data(), scratch.data());
