@@ -5,6 +5,7 @@
 #include <span>
 
 #include "plant/contact.h"
+#include "plant/devices.h"
 #include "plant/laws/engine.h"
 #include "plant/laws/hydraulics.h"
 #include "plant/laws/sensor.h"
@@ -15,8 +16,6 @@ namespace shiftrig::plant {
 namespace {
 
 using detail::ModelData;
-
-constexpr double at_rest = 1e-9;  // [rad/s]
 
 // The speeds nearest to `wanted` (in the sense of kinetic energy, so that momentum is conserved) for which
 // the named columns slip at zero and the pinned masses turn as told. `mounted`: what a spring holds to the housing stands.
@@ -116,7 +115,7 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
     for (int k = 0; k < m.meshes; ++k) {
         const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
         const double motion = detail::slip_of(mesh.motion(), speeds);
-        const bool stuck = mesh.lossy() && std::fabs(motion) <= at_rest;
+        const bool stuck = mesh.lossy() && std::fabs(motion) <= detail::at_rest;
         contact[m.pairs + k] = stuck          ? static_cast<unsigned char>(detail::stuck)
                                : mesh.lossy() ? detail::moving(motion, 1)
                                               : static_cast<unsigned char>(detail::moves);
@@ -138,7 +137,7 @@ void initialise(const ModelData& m, double* block, const std::vector<double>& in
         const detail::EngineLaw& law = m.engines[e];
         const Engine& engine = m.description.engines[e];
         const double speed = speeds[law.mass];
-        const bool running = speed >= engine.stall_speed;
+        const bool running = !has_stalled(engine, speed);
         block[m.layout.engines + 3 * static_cast<int>(e)] =
             static_cast<double>(static_cast<int>(running ? EngineMode::running : EngineMode::stalled));
         if (!running) continue;
@@ -216,10 +215,16 @@ bool State::is_of(const Model& model) const noexcept {
         return false;
     const auto* const contact = reinterpret_cast<const unsigned char*>(at + m.layout.contact);
     for (int k = 0; k < m.contact_bytes; ++k) {
-        const int most = k < m.pairs         ? detail::free_running
-                         : k < m.first_flank ? detail::moves | detail::moves_backward | detail::driven
-                                             : detail::flank_backward;
-        if (contact[k] > most) return false;
+        const unsigned char state = contact[k];
+        if (k < m.pairs || k >= m.first_flank) {
+            const int most = k < m.pairs ? int{detail::free_running} : int{detail::flank_backward};
+            if (state > most) return false;
+            continue;
+        }
+        const bool moving = (state & detail::moves) != 0;
+        if (state > (detail::moves | detail::moves_backward | detail::driven) ||
+            (!moving && state != detail::stuck))
+            return false;
     }
     for (const int k : m.hydraulic_pairs) {
         const detail::PairLaw& law = m.pair_laws[static_cast<std::size_t>(k)];

@@ -49,15 +49,20 @@ struct EngineState {
 
 enum class EngineMode { running, stalled, cranking };
 
+// Turned backwards, beyond what rounding leaves of a speed at rest [rad/s]: one that neither fades nor stalls gives its torque at
+// rest as well, whichever sign that has.
+constexpr double turned_backwards = -1e-9;
+
 inline double full_load(const Engine& p, double speed) noexcept {
-    if (speed >= p.fade_from) return interpolate(p.full_load, speed);
+    if (speed >= p.fade_from || (p.fade_from == 0 && speed >= turned_backwards))
+        return interpolate(p.full_load, speed);
     if (speed <= p.fade_to) return 0;
     return interpolate(p.full_load, p.fade_from) * ((speed - p.fade_to) / (p.fade_from - p.fade_to));
 }
 
 // The same from the curve made ready.
 inline double full_load(const Engine& p, const Curve& curve, double speed) noexcept {
-    if (speed >= p.fade_from) return curve.at(speed);
+    if (speed >= p.fade_from || (p.fade_from == 0 && speed >= turned_backwards)) return curve.at(speed);
     if (speed <= p.fade_to) return 0;
     return curve.at(p.fade_from) * ((speed - p.fade_to) / (p.fade_from - p.fade_to));
 }
@@ -133,19 +138,23 @@ inline double stalled_friction_capacity(const Engine& p, EngineMode mode, double
     return mode == EngineMode::stalled ? engine_friction(p, speed) : 0;
 }
 
+inline bool has_stalled(const Engine& p, double speed) noexcept {
+    return speed < p.stall_speed && (p.stall_speed > 0 || speed < turned_backwards);
+}
+
 // Mode for the next step, decided at the end of this one. `crank_time` [s] counts in cranking.
 inline EngineMode next_engine_mode(const Engine& p, EngineMode mode, double speed, bool start_edge, double h,
                                    double& crank_time) noexcept {
     constexpr double longest_cranking = 3;  // [s]
     switch (mode) {
         case EngineMode::running:
-            return speed < p.stall_speed ? EngineMode::stalled : EngineMode::running;
+            return has_stalled(p, speed) ? EngineMode::stalled : EngineMode::running;
         case EngineMode::stalled:
             crank_time = 0;
             return start_edge ? EngineMode::cranking : EngineMode::stalled;
         case EngineMode::cranking:
             crank_time += h;
-            if (speed >= p.fade_from && speed >= p.stall_speed) return EngineMode::running;
+            if (speed >= p.fade_from && !has_stalled(p, speed)) return EngineMode::running;
             return crank_time < longest_cranking ? EngineMode::cranking : EngineMode::stalled;
     }
     return mode;

@@ -168,6 +168,25 @@ TEST(EngineInAMachine, BuildsUpItsBoostWhetherItCanStallOrNot) {
     }
 }
 
+// One that neither fades nor stalls pulls against a brake for as long as one likes, whichever way rounding has it turn there.
+TEST(EngineLaw, RestIsNotTurnedBackwards) {
+    Engine motor = reference_engine();
+    motor.fade_from = motor.fade_to = motor.stall_speed = 0;
+    const double at_rest = full_load(motor, 0);
+    EXPECT_GT(at_rest, 0);
+    for (const double speed : {1e-16, -1e-16, -1e-12}) {
+        double crank = 0;
+        EXPECT_EQ(full_load(motor, speed), at_rest) << speed;
+        EXPECT_EQ(full_load(motor, Curve(motor.full_load), speed), at_rest) << speed;
+        EXPECT_EQ(next_engine_mode(motor, EngineMode::running, speed, false, 1e-3, crank),
+                  EngineMode::running)
+            << speed;
+    }
+    double crank = 0;
+    EXPECT_EQ(full_load(motor, -1), 0);
+    EXPECT_EQ(next_engine_mode(motor, EngineMode::running, -1, false, 1e-3, crank), EngineMode::stalled);
+}
+
 // Without a stall speed it has stalled only where something turns it backwards: its friction is there all the same.
 // 2 dω/dt = −(70 + 0.45 ω), from 20 rad/s.
 TEST(EngineInAMachine, TurnedBackwardsIsBrakedByItsFriction) {

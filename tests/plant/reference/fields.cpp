@@ -62,10 +62,11 @@ struct Motor {  // an engine
     int mass, state;  // torque, boost, mode, cranked, start before
     Told throttle, start, request_enable, request, limit, cut;
 
+    static constexpr double at_rest = 1e-9;  // no engine is turned backwards by rounding [rad/s]
     enum Mode { running, stalled, cranking };
     int mode(const Vector& z) const { return static_cast<int>(z[state + 2]); }
     double full(double w) const {
-        if (w >= p.fade_from) return value_of(p.full_load, w);
+        if (w >= p.fade_from - (p.fade_from > 0 ? 0 : at_rest)) return value_of(p.full_load, w);
         if (w <= p.fade_to) return 0;
         return value_of(p.full_load, p.fade_from) * (w - p.fade_to) / (p.fade_from - p.fade_to);
     }
@@ -99,7 +100,7 @@ struct Motor {  // an engine
     // As in steady running.
     void begin(Vector& z) const {
         const double w = z[mass];
-        z[state + 2] = w < p.stall_speed ? stalled : running;
+        z[state + 2] = w < p.stall_speed - (p.stall_speed > 0 ? 0 : at_rest) ? stalled : running;
         if (mode(z) != running) return;
         const When now{0, 0};
         z[state] = demand(now, w, 1);
@@ -109,7 +110,7 @@ struct Motor {  // an engine
         const int before = mode(z);
         int next = before;
         const double w = z[mass], asked = start.at(when.inside);
-        if (before == running && w < p.stall_speed - 1e-9) next = stalled;  // not by rounding at rest
+        if (before == running && w < p.stall_speed - at_rest) next = stalled;
         if (before == stalled) {
             z[state + 3] = 0;
             if (asked > 0.5 && z[state + 4] <= 0.5) next = cranking;
