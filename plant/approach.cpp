@@ -70,9 +70,9 @@ Approached approach_margin(Work& w, const Mode& mode, const Crossing& crossing, 
     const auto left = [&](Sample& sample) { return crossing_margin(w, mode, crossing, sample) + over; };
     RootSearch search{done, until, left(w.scratch.begin()), left(w.scratch.end()),
                       done + crossing.theta * (until - done)};
-    // Of the margins at both ends. A mesh that turns or goes acts by itself once that lies behind: go a little
-    // beyond. So too with a pair that lets go at next to no torque, or comes to hold its share: this side of it, it would
-    // only lock, or let go, again.
+    // A mesh that turns or goes changes by itself once the crossing lies behind: go a little beyond. So too with a pair that lets go
+    // in its weak sense, or comes to hold its share: this side of it, it would only lock, or let go, again. `close_enough` is a
+    // share of the margins at both ends together.
     const bool by_itself = acts_by_itself(crossing.change),
                safely = crossing.change == Change::overrun || crossing.change == Change::hold;
     const double close_enough = (by_itself ? 1e-2 : safely ? 1e-3 : 1e-6) * search.size();
@@ -86,7 +86,7 @@ Approached approach_margin(Work& w, const Mode& mode, const Crossing& crossing, 
         const bool near = std::fabs(rest) <= close_enough, last = steps == most_steps,
                    beyond_it = rest <= 0.9 * over || !(gives_way || crossing.change == Change::hold);
         if (near && beyond_it) return {reached};
-        if (last && crossing.change != Change::hold) return {reached, near};
+        if (last && crossing.change != Change::hold) return {reached, near && beyond_it};
         search.tell(rest, beyond);
         if (steps < most_steps) continue;
         // What holds a little later moves nothing: others bear the difference so long.

@@ -23,7 +23,7 @@ void pivot(double* tableau, int size, int row, int column) {
 }
 
 // What a tie is to the values of the rows: rates may be large, where loads are shared out by a little give.
-double largest_of(double rate_a, double rate_b) {
+double tie_scale(double rate_a, double rate_b) {
     return std::fmax(1, std::fmax(rate_a, rate_b));
 }
 
@@ -32,7 +32,7 @@ double largest_of(double rate_a, double rate_b) {
 bool leaves_before(const double* a, double rate_a, const double* b, double rate_b, int size) {
     const int last = lemke_columns(size) - 1;
     const double difference = a[last] / rate_a - b[last] / rate_b;
-    if (std::fabs(difference) * largest_of(rate_a, rate_b) > nothing) return difference < 0;
+    if (std::fabs(difference) * tie_scale(rate_a, rate_b) > nothing) return difference < 0;
     for (int c = 0; c < size; ++c) {
         const double by_column = a[c] / rate_a - b[c] / rate_b;
         if (std::fabs(by_column) > nothing) return by_column < 0;
@@ -42,14 +42,21 @@ bool leaves_before(const double* a, double rate_a, const double* b, double rate_
 
 }  // namespace
 
-bool solve_complementarity(double* tableau, int* basis, int size) SHIFTRIG_REALTIME {
+bool solve_complementarity(double* tableau, int* basis, int size, int course) SHIFTRIG_REALTIME {
     const int columns = lemke_columns(size), artificial = 2 * size, last = columns - 1;
+    const auto lack = [&](int r) {
+        const double* const line = tableau + r * columns;
+        return line[last] / line[artificial];
+    };
     int row = -1;
     for (int r = 0; r < size; ++r) {
         basis[r] = r;
         double* const line = tableau + r * columns;
-        line[artificial] = -1;
-        if (line[last] < 0 && (row < 0 || line[last] <= tableau[row * columns + last])) row = r;
+        // Any positive numbers do: 1, or others without a pattern.
+        double whole;
+        line[artificial] =
+            -(course == 0 ? 1 : 0.1 + std::modf(0.6180339887498949 * course * (r + 1), &whole));
+        if (line[last] < 0 && (row < 0 || lack(r) >= lack(row))) row = r;
     }
     if (row < 0) return true;
     int entering = artificial;
@@ -69,10 +76,10 @@ bool solve_complementarity(double* tableau, int* basis, int size) SHIFTRIG_REALT
             const bool sooner = row < 0 || leaves_before(line, rate, best, best[entering], size);
             const bool ends =
                 basis[r] == artificial && row >= 0 &&
-                (line[last] / rate - best[last] / best[entering]) * largest_of(1, best[entering]) <= nothing;
+                (line[last] / rate - best[last] / best[entering]) * tie_scale(1, best[entering]) <= nothing;
             const bool kept =
                 row >= 0 && basis[row] == artificial &&
-                (best[last] / best[entering] - line[last] / rate) * largest_of(1, rate) <= nothing;
+                (best[last] / best[entering] - line[last] / rate) * tie_scale(1, rate) <= nothing;
             if ((sooner && !kept) || ends) row = r;
         }
         if (row < 0) return false;

@@ -15,6 +15,6 @@ namespace shiftrig::plant::detail {
 constexpr int lemke_columns(int size) noexcept {
     return 2 * size + 2;
 }
-bool solve_complementarity(double* tableau, int* basis, int size) SHIFTRIG_REALTIME;
+bool solve_complementarity(double* tableau, int* basis, int size, int course = 0) SHIFTRIG_REALTIME;
 
 }  // namespace shiftrig::plant::detail

@@ -26,7 +26,7 @@ struct ContactTable {
     // Per pair: its friction factor is base + rise · exp(−|slip| · inverse_speed); that at rest where it is locked, base alone
     // where an actuated one runs free. Base and rise are 0 where the factor is a table.
     double *base = nullptr, *rise = nullptr, *inverse_speed = nullptr;
-    bool fades = false;            // some rise is not 0
+    bool fades = false;            // some rise of an actuated pair is not 0
     bool acts = false;             // some actuated pair may have a force: it slips, or drags
     double* state_code = nullptr;  // per pair, as outputs show it
     // Per mesh: power flows as assumed where drive · M_1 − drive_offset is not negative; 0 for those without losses or at rest.

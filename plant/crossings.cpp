@@ -273,9 +273,9 @@ Crossing first_crossing(Work& w, const Mode& mode, Sample& begin, Sample& end,
         if (!middle_known) complete_half(w, mode);
         middle_known = true;
         const double g0 = turning_margin(w, k, begin), gm = turning_margin(w, k, w.scratch.half);
-        // From no torque at all: the other loss acts from the beginning.
         if (g0 <= 0 && gm >= 0)
             continue;  // just turned: within rounding of the point where both losses agree
+        // From no torque at all the other loss acts from the beginning: θ is 0 then.
         const double theta = parabola_root(g0, 4 * gm - 3 * g0 - g1, g1);
         consider({k, theta, Change::turn});
     }

@@ -94,7 +94,7 @@ struct Description {
 
     Transition transition = Transition::localised;
     Method method = Method::automatic;
-    int maximum_events = 4;  // K: located in one step, of its parts K each at most
+    int maximum_events = 4;  // K: located in a step that is taken whole; one in n parts has room for n K
     // A step is taken in up to this many parts where shafts swing or forces change too fast for one; 1: never.
     // Both together bound the cost of a step, and are bounded for it. Where they are too few for the machine its model has more
     // (bound_step() in model_decisions.cpp): parts, if they are not 1, up to 256 for friction that changes too steeply over the

@@ -26,7 +26,7 @@ inline double device_slip(const Work& w, int device, const double* speeds) {
                             : slip_fast(m.mesh_motion[static_cast<std::size_t>(device - m.pairs)], speeds);
 }
 
-// Sum of magnitudes behind a slip: what its rounding errors are relative to.
+// Sum of magnitudes behind a slip (of rates: behind its acceleration), not less than 1: what its rounding errors are relative to.
 inline double slip_scale(const Work& w, int device, const double* speeds) {
     const std::array<Link, 2> links =
         device < w.model.pairs ? pair_links(w, device) : mesh_of(w, device - w.model.pairs).motion();
@@ -88,12 +88,15 @@ inline double opening_sense(const Work& w, int pair, double torque, const Sample
     return 2 * torque < difference ? -1 : 1;
 }
 
+constexpr double at_its_limit =
+    1e-5;  // of the limit: what a pair that gives way is from it at most, well above rounding
+
 // Of a locked pair ([Algin] eq. (12)). Capacities may be as small as the rounding of torques, and what came to hold in this
 // instant what it pushed with may be wrong by as much as the instant is.
 inline bool is_overloaded(const Work& w, int pair, const Sample& s) {
     if (pair < 0) return false;
     const double torque = std::fabs(s.torque[pair]), limit = static_limit(w, pair, s);
-    const double most = w.scratch.eased[static_cast<std::size_t>(pair)] ? 1 + 1e-5 : overload;
+    const double most = w.scratch.eased[static_cast<std::size_t>(pair)] ? 1 + at_its_limit : overload;
     return torque > most * limit && torque > 1e-11 * torque_scale(w, s);
 }
 

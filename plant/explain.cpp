@@ -9,7 +9,7 @@
 namespace shiftrig::plant {
 namespace {
 
-// A torque of an event, whether it is one of a truck or of a watch.
+// A torque of an event: with one decimal from 1 Nm on, below with three digits.
 std::string amount(const Event& event, double value) {
     const double size = std::max(std::fabs(event.torque), std::fabs(event.capacity));
     if (size >= 1 && std::fabs(value) < 0.05) value = 0;  // no −0.0

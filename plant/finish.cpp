@@ -74,6 +74,7 @@ void reset(Outputs& outputs, ScratchData& scratch, int forces) {
     outputs.certificate = {};
     outputs.event_count = 0;
     scratch.tells_on = false;
+    if (scratch.noted_count > 0) forget_notes(scratch);  // a look leaves them untold
     clear_few(scratch.work, scratch.work + forces);
     scratch.dissipated = scratch.input_work = 0;
     scratch.part_mode = nullptr;
@@ -286,7 +287,8 @@ void finish_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     certificate.torque_residual = torque_residual(w, mode, s.begin());
     certificate.constraint_violation = constraint_violation(mode, s.begin().z);
     certificate.mode_misses += static_cast<std::int32_t>(w.operators.misses);
-    if (!std::isfinite(s.stored)) certificate.flags |= 4;  // a sum over every speed and twist
+    if (!std::isfinite(s.stored))
+        certificate.flags |= Certificate::not_finite;  // a sum over every speed and twist
     tell_step(w, mode);
     fill_outputs(w, mode, s.begin());
 

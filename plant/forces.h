@@ -69,7 +69,7 @@ double* read_coordinates(const Mode& mode, const Sample& sample) SHIFTRIG_REALTI
 // From coordinates, so many rows of the view: ModelData::law_rows, power_rows or all of them.
 void show(const ModelData& model, const Mode& mode, const double* coordinates, Sample& sample,
           int rows) SHIFTRIG_REALTIME;
-// The same from the sample's own z, which comes to lie on the constraints of the mode.
+// All rows, from the sample's own z. Of a dense mode z is written back, and comes to lie on its constraints; on a tree it stays as it is.
 void look(const ModelData& model, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;
 
 // An input as it acts; 0 where the model has none.

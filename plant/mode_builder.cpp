@@ -65,8 +65,7 @@ int pivoted_basis(double* columns, int count, int n, double* basis) {
 
 // x of a mesh in the mode; a stuck one has no loss.
 int exponent(const ModelData& m, const Mode& mode, int mesh) {
-    const unsigned char key = mode.key[m.pairs + mesh];
-    return key == 0 ? 0 : key == 2 ? -1 : 1;
+    return key_exponent(mode.key[m.pairs + mesh]);
 }
 
 // Of dependent rows: Gᵀ = Q Lᵀ, Q (rows × rank) with orthonormal columns, so that G⁺ = Q L⁻¹ without G Gᵀ, in which weights far
@@ -175,7 +174,6 @@ ModeSizes::ModeSizes(const ModelData& m) {
     operators = m.states_padded * (3 * m.columns + 5 * m.forces) + 4 * panel_rows;  // of one length
     levels = m.ledger_levels * whole_panels(operators);
     sparse_rates = SparseRates::most_entries(m.states);
-    key = (m.contact_bytes + 7) / 8 * 8;
 }
 
 void mode_key(const ModelData& m, const unsigned char* contact, unsigned char* key) SHIFTRIG_REALTIME {
@@ -191,9 +189,9 @@ int workspace_doubles(const ModelData& m) noexcept {
     const int square = m.states_padded * m.states_padded;
     const int mode = n * unknowns           // columns
                      + n * unknowns         // force columns
-                     + unknowns * unknowns  // G, H
+                     + unknowns * unknowns  // G
                      + 2 * n * unknowns     // T̂, right-hand sides
-                     + unknowns * unknowns  // G again
+                     + unknowns * unknowns  // of share_out(): Q
                      + padded(n) * n        // B
                      + 4 * (m.states_padded + m.torques) + m.states_padded * m.columns +
                      padded(m.torques) * m.columns + coordinates_workspace(m);
@@ -239,7 +237,7 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
     for (int k = 0; k < m.meshes; ++k) {
         const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
         scaled_column(m, mesh.motion(), column);
-        mode.bound[m.pairs + k] = rest() < dependent ? by_active_set : 0;
+        mode.bound[m.pairs + k] = rest() < dependent ? held_in_set : 0;
     }
     for (int k = 0; k < m.meshes; ++k) {
         const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
@@ -250,12 +248,12 @@ void build_mode(const ModelData& m, Mode& mode, double* workspace, int* integers
     }
     for (int k = 0; k < m.pairs; ++k) {
         scaled_column(m, s.pairs[static_cast<std::size_t>(k)].links, column);
-        mode.bound[k] = rest() < dependent ? by_active_set : 0;
+        mode.bound[k] = rest() < dependent ? held_in_set : 0;
     }
     for (int k = 0; k < m.meshes; ++k) {  // moving meshes that stuck ones hold
         const Mesh& mesh = s.meshes[static_cast<std::size_t>(k)];
         scaled_column(m, mesh.motion(), column);
-        if (rest() < dependent) mode.bound[m.pairs + k] |= by_stuck_meshes;
+        if (rest() < dependent) mode.bound[m.pairs + k] |= held_in_set;
     }
     const int rows = mode.row_count, rank = mode.rank;
     mode.redundant = rows > rank;

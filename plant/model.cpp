@@ -139,7 +139,7 @@ void build_pair_laws(ModelBuilder& builder) {
         if (law.source == LoadSource::release || law.source == LoadSource::apply) m.pedal_pairs.push_back(k);
         if (law.source == LoadSource::waveform) m.waveform_pairs.push_back(k);
         if (law.heat) m.heated_pairs.push_back(k);
-        if (law.source < LoadSource::rolling) m.actuated_pairs = k + 1;
+        if (is_actuated(law.source)) m.actuated_pairs = k + 1;
     }
     m.layout.actuators = builder.actuator(0);  // sizes for now, offsets in build_layout
     m.layout.temperatures = 2 * whole_panels(heated);

@@ -23,7 +23,8 @@
 
 namespace shiftrig::plant::detail {
 
-// What presses a friction pair together, and where that comes from.
+// What presses a friction pair together, and where that comes from: first what is actuated, then, from `rolling` on, loads by
+// nature.
 enum class LoadSource {
     constant,
     waveform,
@@ -36,6 +37,10 @@ enum class LoadSource {
     engine,
     rated
 };
+
+constexpr bool is_actuated(LoadSource source) noexcept {
+    return source < LoadSource::rolling;
+}
 
 struct PairLaw {
     LoadSource source{};

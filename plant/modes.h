@@ -28,10 +28,15 @@ namespace shiftrig::plant::detail {
 
 // Bits of Mode::bound: why a pair does not slip, a mesh does not move.
 enum Bound : unsigned char {
-    by_active_set = 1,    // others of the active set hold it at zero: it cannot change its state by itself
-    by_stuck_meshes = 2,  // meshes only: held by a stuck mesh
-    shares_load = 4,      // locked pair whose torque is not unique: it is in a loop of closed devices
+    held_in_set =
+        1,  // the active set, meshes at rest among it, leaves its slip no freedom: also of what is in that set itself
+    shares_load = 2,  // locked pair whose torque is not unique: it is in a loop of closed devices
 };
+
+// x of a mesh by its byte of Mode::key; one at rest has no loss.
+constexpr int key_exponent(unsigned char key) noexcept {
+    return key == 0 ? 0 : key == 2 ? -1 : 1;
+}
 
 struct Mode {
     std::uint64_t last_use = 0;      // 0: empty
@@ -62,7 +67,7 @@ struct Mode {
         nullptr;  // [R_q R_f]         panels, (rows + translating) × (order + forces); the latter
                   //                   are accelerations
     double* force_torques = nullptr;  // R_f alone              panels, rows + translating × forces
-    double* balance = nullptr;  // C_Iᵀ J⁻¹ (M̃ − Ĉ M_R), in torques  panels, rows × (order + forces + rows)
+    double* balance = nullptr;  // C_Rᵀ J⁻¹ (M̃ − Ĉ M_R), in torques  panels, rows × (order + forces + rows)
     StepOperators step;    // for the model's step size; of length 0 until make_ready()
     int ledger_parts = 1;  // into how many parts the ledger divides a step: shafts and dampers are fast
     StepOperators ledger;  // for one of them
@@ -85,7 +90,6 @@ inline bool is_shaft_closed(const ModelData& m, const Mode& mode, int shaft) noe
 struct ModeSizes {
     int basis = 0, view = 0, mobility = 0, rates = 0, scaled_rates = 0, energy_root = 0, torques = 0,
         force_torques = 0, balance = 0, operators = 0, levels = 0, sparse_rates = 0;
-    int key = 0;  // bytes, a multiple of 8
     explicit ModeSizes(const ModelData& model);
     int doubles() const noexcept {
         return basis + view + mobility + rates + scaled_rates + energy_root + torques + force_torques +
@@ -187,7 +191,8 @@ struct OperatorsData {
     void place_trees(const ModelData& model);
 };
 
-// The mode of these contact states, from the table or built now.
+// The mode of these contact states, from the table or built now. Those in scratch.trial are tried: their mode may be forgotten when
+// the next one is asked for. Any others are in force from now on, and the mode that was so until now may be forgotten.
 Mode& find_mode(const ModelData& model, OperatorsData& operators, const unsigned char* contact,
                 ScratchData& scratch) SHIFTRIG_REALTIME;
 

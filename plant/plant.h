@@ -96,16 +96,17 @@ inline double margin(const Event& event) noexcept {
 }
 constexpr int most_members = 63;
 
-// In words: `t=1.2034517 F2 locks: slip 0, torque 812.4 of 2569.3 Nm static`.
 class Model;
+// In words: `t=1.2034517 F2 locks: slip 0, torque 812.4 of 2569.3 Nm static`.
 std::string explain(const Model& model, const Event& event);
 // Does this device, as device_names() counts them, ever tell such an event?
 bool tells(const Model& model, std::size_t device, EventKind kind) noexcept;
 
 // Proof of one step, as numbers.
 struct Certificate {
+    enum Flag : std::int32_t { tie_up = 1, no_agreement = 2, not_finite = 4, coarse = 8, instant_lost = 16 };
     double torque_residual = 0;       // of eq. (15), relative to the torque scale
-    double constraint_violation = 0;  // worst |C_Iᵀω| [rad/s]
+    double constraint_violation = 0;  // worst |C_Rᵀω| [rad/s]
     double energy_defect = 0;         // ΔE − in + dissipated over this step [J]
     std::int32_t events = 0;          // localised in this step
     std::int32_t fall_backs = 0;      // next-step rule used

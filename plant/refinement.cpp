@@ -13,8 +13,9 @@ namespace shiftrig::plant::detail {
 namespace {
 
 // Of the largest torque, of the largest speed, of the way that the fastest mass turns.
-constexpr double force_tolerance = 2e-5, swing_tolerance = 2e-5, speed_tolerance = 1e-6,
-                 twist_tolerance = 3e-6;
+// What the shortest parts leave of forces is told of where it is ten times as much: their extrapolation errs by more than they do.
+constexpr double force_tolerance = 2e-6, told_force_tolerance = 2e-5, swing_tolerance = 2e-5,
+                 speed_tolerance = 1e-6, twist_tolerance = 3e-6;
 constexpr double rounding = 1e-9;  // of the torques in shafts: by so much they differ where nothing swings
 
 // Is this more than so much of the largest torque? That the forces are among these mostly settles it.
@@ -33,15 +34,15 @@ bool exceeds(const Work& w, double torque, double share) {
 // of a little torque, so speeds matter as well: at the end they differ by at most `reach` times the largest of those
 // differences, and by change() in fact. `other`: a torque that is amiss besides.
 template <typename Change>
-bool takes_forces_amiss(const Work& w, const double* late, double reach, const Change& change,
-                        double other = 0) {
+bool takes_forces_amiss(const Work& w, double tolerance, const double* late, double reach,
+                        const Change& change, double other = 0) {
     const ModelData& m = w.model;
     const DeviceLoops& loops = m.kernel.loops;
     const Sample& end = w.scratch.end();
     const double wrong = loops.largest_difference(end.f, late, m.forces);
     if (wrong == 0 && other == 0) return false;
     const double much = speed_tolerance * loops.largest(end.z, m.masses);
-    return (reach * wrong > much && change() > much) || exceeds(w, std::max(wrong, other), force_tolerance);
+    return (reach * wrong > much && change() > much) || exceeds(w, std::max(wrong, other), tolerance);
 }
 
 // Slow states (slip of tyres, torque and boost of engines) stand on the same stage, which weighs so much [s]: the torque that
@@ -154,7 +155,7 @@ bool hides_swing(const Work& w) {
     return hides_swing(w, true) && hides_swing(w, false);
 }
 
-bool is_dense_coarse(Work& w, const Mode& mode) {
+bool is_dense_coarse(Work& w, const Mode& mode, double tolerance) {
     const ModelData& m = w.model;
     const Sample &late = w.scratch.late, &end = w.scratch.end();
     const auto change = [&] {
@@ -170,7 +171,7 @@ bool is_dense_coarse(Work& w, const Mode& mode) {
         return moved;
     };
     const double slow = slow_states_amiss(w, (end.at.time - w.scratch.begin().at.time) / 6);
-    return takes_forces_amiss(w, late.f, w.scratch.used.late_reach, change, slow) ||
+    return takes_forces_amiss(w, tolerance, late.f, w.scratch.used.late_reach, change, slow) ||
            friction_outruns_stages(w, [&](int k) { return dense_answer(w, mode, k); }) || hides_swing(w);
 }
 
@@ -186,7 +187,7 @@ bool swings_between(const Work& w, const Mode& mode) {
            rounding * loops.largest(end.groups.passed, paths.groups);
 }
 
-bool is_tree_coarse(Work& w, const Mode& mode) {
+bool is_tree_coarse(Work& w, const Mode& mode, double tolerance) {
     const ModelData& m = w.model;
     const Sample &begin = w.scratch.begin(), &end = w.scratch.end();
     const TreeMode& t = *mode.tree;
@@ -203,14 +204,16 @@ bool is_tree_coarse(Work& w, const Mode& mode) {
         return m.kernel.loops.largest(of_mass, m.masses);
     };
     return swings_between(w, mode) ||
-           takes_forces_amiss(w, late, weight * t.liveliness, change, slow_states_amiss(w, weight)) ||
+           takes_forces_amiss(w, tolerance, late, weight * t.liveliness, change,
+                              slow_states_amiss(w, weight)) ||
            friction_outruns_stages(w, [&](int k) { return tree_answer(t, h, k); });
 }
 
 }  // namespace
 
-bool is_coarse(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
-    return mode.tree ? is_tree_coarse(w, mode) : is_dense_coarse(w, mode);
+bool is_coarse(Work& w, const Mode& mode, bool shortest) SHIFTRIG_REALTIME {
+    const double tolerance = shortest ? told_force_tolerance : force_tolerance;
+    return mode.tree ? is_tree_coarse(w, mode, tolerance) : is_dense_coarse(w, mode, tolerance);
 }
 
 namespace {

@@ -8,7 +8,8 @@ namespace shiftrig::plant::detail {
 // After advance(): do shafts swing within the part, or do forces that depend on the motion change so fast, that
 // its few samples do not show it? The exponential step takes linear motion exactly at any length, but not the instants at which
 // contacts change, nor forces taken from the stages; that along the tree does not take swings exactly either.
-bool is_coarse(Work& work, const Mode& mode) SHIFTRIG_REALTIME;
+// `shortest`: so much so that it is told of, since no shorter part is allowed.
+bool is_coarse(Work& work, const Mode& mode, bool shortest = false) SHIFTRIG_REALTIME;
 
 // Where between begin and end a law first comes upon a knot (of a friction table, of a converter, of an engine's curve or its
 // governor's limits), beyond which the part's few samples would see another slope. 1: nowhere.

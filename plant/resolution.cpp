@@ -72,9 +72,9 @@ class Answers {
         const double stiffness = tyre_force_slope(tyre_soil(tyre, tyre.mobility_number)) * tyre.radius *
                                  tyre.radius / tyre.relaxation_length;
         const double mobile = mobility({s_.mass(tyre.wheel), 1}, {s_.mass(tyre.body), -1 / tyre.radius});
-        const double slowest =
+        const double answer =
             1 / std::max(stiffness * tyre.slip_damping_time * mobile, std::sqrt(stiffness * mobile));
-        say("tyre \"" + tyre.name + "\": its force answers the slip of its wheel within ", slowest);
+        say("tyre \"" + tyre.name + "\": its force answers the slip of its wheel within ", answer);
     }
     void of(const TorqueSource& source) {
         of_square("source \"" + source.name + "\": its drag", source.mass, source.quadratic);

@@ -51,18 +51,19 @@ struct RestProblem {
     RestJoint joints[most_joints];
     int count = 0, bends = 0;
     bool mirrored = false;  // solve the mirror image, and mirror what comes out
+    double unit = 0;        // torques are counted in it
     int mesh_rows = 0;      // of `mesh`: all meshes; on a tree those at rest
     int basis[4 * most_joints];
     double* free = nullptr;    // J^(−1/2) M̃, then per joint −J^(−1/2) ĉ; masses × (1 + joints)
     double* motion = nullptr;  // J^(−1/2) c, masses × joints
     double* mesh = nullptr;    // M: mesh_rows × (1 + joints)
-    double *columns = nullptr, *forces = nullptr;  // J^(−1/2) A, Â: masses × meshes
-    double* g = nullptr;                           // G
-    TrainWork trains;                              // instead of these, on a tree
-    double* w = nullptr;                           // W, joints × joints, by rows like the next two
-    double* response = nullptr;                    // of y to what a limit gives, joints × joints
-    double* turn = nullptr;                        // of M to it, of meshes at rest
-    double *left = nullptr, *inverse = nullptr;
+    double *columns = nullptr, *forces = nullptr;          // J^(−1/2) A, Â: masses × meshes
+    double* g = nullptr;                                   // G
+    TrainWork trains;                                      // instead of these, on a tree
+    double* w = nullptr;                                   // W, joints × joints, by rows like the next two
+    double* response = nullptr;                            // (I − H C)⁻¹: by how much y_i falls per p_j
+    double* turn = nullptr;                                // the same of M of mesh i at rest
+    double *left = nullptr, *inverse = nullptr;            // work for it, by columns
     double *b = nullptr, *y = nullptr, *torque = nullptr;  // M of meshes at rest, at y
     double* tableau = nullptr;
 
@@ -95,6 +96,12 @@ enum class Split {
 
 // Solves it with the limits as they stand; leaves the torques of its solution in y and `torque`. False: no solution was found.
 bool solve_rest_problem(Split split, RestProblem& rest) SHIFTRIG_REALTIME;
+
+// Is there a split within all limits, so that nothing goes? Where large losses make rest and motion both a solution, Lemke's
+// method may come upon the motion. Of all such splits it leaves that in y and `torque` whose pairs use least of what they hold.
+// False as well where more meshes at rest bend than are asked.
+bool find_rest(RestProblem& rest) SHIFTRIG_REALTIME;
+int side_at_rest(const RestProblem& rest, int i) SHIFTRIG_REALTIME;
 
 // Where joint i of the solution is: 0 within its limits, +1 at the upper one, −1 at the lower one. `going`: its acceleration,
 // as a share of what there could be.

@@ -22,7 +22,7 @@ struct Instant {
 
 struct Sample {
     Instant at;
-    // What the mode's view shows of the coordinates q, in the order of View: a product fills all or the first of these.
+    // What the mode's view shows of the coordinates q, in the order of the rows of Mode::view (ModelData::law_rows, power_rows, seen): a product fills all or the first of these.
     double* slip = nullptr;     // per force: slip of pairs, of bearings in meshes, −ω of external torques
     double* motion = nullptr;   // per mesh: ω_first − ω_carrier; not on a tree
     double* turning = nullptr;  // per mesh: what its loss torque acts on (ModelData::mesh_loss)

@@ -77,7 +77,7 @@ Mode& find_directions(Work& w, unsigned char* contact, Sample& s, bool complete)
         }
         if (worst < 0) return mode;
         if (flips >= most) {
-            w.outputs.certificate.flags |= 2;
+            w.outputs.certificate.flags |= Certificate::no_agreement;
             return mode;
         }
         contact[m.pairs + worst] ^= driven;
@@ -89,7 +89,7 @@ Tried try_directions(Work& w, unsigned char* contact, Sample& s) SHIFTRIG_REALTI
     int& flags = w.outputs.certificate.flags;
     const int kept = std::exchange(flags, 0);
     Mode& mode = find_directions(w, contact, s);
-    const bool agrees = (flags & 2) == 0;
+    const bool agrees = (flags & Certificate::no_agreement) == 0;
     flags = kept;
     return {mode, agrees};
 }
@@ -176,7 +176,7 @@ Mode& settle(Work& w, Sample& s, bool complete) SHIFTRIG_REALTIME {
                 continue;
             }
         } else {
-            w.outputs.certificate.flags |= 2;
+            w.outputs.certificate.flags |= Certificate::no_agreement;
         }
         if (w.scratch.noted_count > 0) follow_others(w, mode, s);
         tell_instant(w, mode, s);

@@ -36,9 +36,6 @@ void open_pair(Work& work, const Mode& mode, int pair, Sample& sample) SHIFTRIG_
 // mesh that relieves the most used pair most is set to its limit. Says whether one was; else rearrange() asks all at rest.
 bool lean_on_losses(Work& work, const Mode& mode, const Use& most, Sample& sample) SHIFTRIG_REALTIME;
 
-constexpr double at_its_limit =
-    1e-5;  // of the limit: what a pair that gives way is from it at most, well above rounding
-
 // A locked pair at its limit or beyond gives way, unless meshes at rest or other pairs take its load; `most` is the most
 // used one. Does anything move?
 bool give_way(Work& work, const Mode& mode, const Use& most, int pair, Sample& sample) SHIFTRIG_REALTIME;

@@ -38,7 +38,8 @@ void set_limits(const Work& w, const Sample& s, RestJoint& joint) {
 bool is_consistent(Work& w, const Piece& piece, unsigned char* contact, bool goes, Sample& s) {
     const ModelData& m = w.model;
     contact_forces(w, contact, s);
-    const Mode& mode = try_directions(w, contact, s).mode;
+    const auto [mode, agrees] = try_directions(w, contact, s);
+    if (mode.tree && !agrees) return false;  // see lean_on_losses()
     if (is_overloaded(w, most_used(w, contact, s, piece).pair, s) || loses_too_much(w, mode, s, piece))
         return false;
     sample_rate(w, mode, s);
@@ -62,6 +63,7 @@ struct Search {
     double given;  // its torque
     RestProblem rest;
     bool goes = false;                       // does anything?
+    bool leans = false;                      // nothing does, by what meshes can lose
     unsigned char vertex[most_joints] = {};  // the joints' states in the exact solution,
     bool going[most_joints] = {};            // does it go?
     bool given_way[most_joints] = {};        // taken to have broken away
@@ -130,10 +132,20 @@ struct Search {
         }
         return true;
     }
-    // Where large losses make rest and motion both a solution, which one is found hangs on signs. What may rest either way rests.
+    // Where large losses make rest and motion both a solution, which one is found hangs on signs and order. What may rest rests.
     bool solve_exactly() {
         const bool backward = leans_backward();
-        return (rest.bends > 0 && solve_exactly(!backward) && !goes) || solve_exactly(backward);
+        leans = false;
+        if (rest.bends > 0 && solve_exactly(!backward) && !goes) return true;
+        const bool solved = solve_exactly(backward);
+        if ((solved && !goes) || !find_rest(rest)) return solved;
+        leans = true;
+        goes = false;
+        for (int i = 0; i < rest.count; ++i) {
+            vertex[i] = state_at(i, side_at_rest(rest, i));
+            going[i] = false;
+        }
+        return true;
     }
 
     template <typename StateOf>
@@ -159,6 +171,20 @@ struct Search {
             if (device != gives_way) return w.contact[device];
             return slipping(opening_sense(w, device, given, s));
         });
+    }
+    // Meshes lose what keeps everything at rest.
+    bool attempt_leaning() {
+        if (!leans) return false;
+        for (const bool holds : {true, false}) {
+            if (attempt([&](int i) {
+                    const int device = rest.joints[i].device;
+                    if (rest.joints[i].mesh >= 0) return vertex[i];
+                    if (device != gives_way) return w.contact[device];
+                    return holds ? closed : slipping(opening_sense(w, device, given, s));
+                }))
+                return true;
+        }
+        return false;
     }
     // The one at its limit leaves the rest to one that pushed without holding anything so far, and could not hold its share.
     bool attempt_held() {
@@ -247,7 +273,7 @@ struct Search {
                 break_away(most);
                 continue;
             }
-            if (attempt_least() || attempt_shared()) return true;
+            if (attempt_least() || attempt_leaning() || attempt_shared()) return true;
             if (break_more_away()) continue;
             if (!breaks_away || overcome(gives_way))
                 return attempt_held() || attempt([&](int i) { return vertex[i]; });

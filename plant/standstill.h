@@ -10,9 +10,9 @@ namespace shiftrig::plant::detail {
 // of the limits. Where closed loops hold, one device at a time cannot find its solution: the load passes from pairs to
 // meshes and back, and what moves in the end may be a pair that has never been at its limit alone.
 //
-// Solves it for everything at rest at the sample, and puts the contact states that follow into place. `gives_way`, a locked pair or
-// −1, is at its limit whatever the last digits of its torque say. On a long chain, of everything at rest that is joined to
-// device `around`. `among_losses`: that meshes of one motion share their losses in another way is a change as well.
+// Solves it for everything at rest at the sample in the piece around device `around` (piece.h; −1: the whole machine), and puts the
+// contact states that follow into place. `gives_way`, a locked pair or −1, is at its limit whatever the last digits of its
+// torque say. Where both rest and motion are solutions, what rests stays at rest. `among_losses`: that meshes of one motion share their losses in another way is a change as well.
 enum class Rearrangement {
     none,    // no solution other than the states there are
     stands,  // others carry the load, nothing moves

@@ -81,7 +81,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
     int dips = m.maximum_events;   // margins looked at where they are least
     int knots = m.maximum_events;  // of laws, met
     const bool divides = localise && m.maximum_parts > 1;
-    const double halvable = (2 - 1e-9) / m.maximum_parts;  // a part of this length
+    const double halvable = (2 - 1e-9) / m.maximum_parts;  // a part at least so long may still be halved
     for (double done = 0; done < 1;) {
         // Advance over what is left, up to the next jump of a law; in halves where that is too much at once.
         const double split = next_split(w, done);
@@ -90,7 +90,8 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         integrate(w, *mode, until);
         while (divides && (is_coarse(w, *mode) || hides_contact(w))) {
             if (length < halvable) {
-                outputs.certificate.flags |= 8;
+                if (is_coarse(w, *mode, true) || hides_contact(w))
+                    outputs.certificate.flags |= Certificate::coarse;
                 break;
             }
             length *= 0.5;
@@ -108,6 +109,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
         }
 
         // Contact-state changes: the first device whose state does not hold until the end (eq. (12), (13)).
+        // K changes in a step taken whole, in one of parts of `length` K/length.
         const bool locates = localise && outputs.certificate.events * length < m.maximum_events;
         Crossing first = first_crossing(w, *mode, s.begin(), s.end(), locates);
         const bool inside = locates && first.device >= 0;
@@ -132,7 +134,7 @@ void step(const Model& model, Operators& operators, State& state, const Inputs& 
                 length *= 0.5;
                 continue;
             }
-            if (!place.found) outputs.certificate.flags |= 16;
+            if (!place.found) outputs.certificate.flags |= Certificate::instant_lost;
             reached = place.fraction;
         }
 

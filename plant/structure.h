@@ -81,8 +81,11 @@ struct Mesh {
     std::array<Link, 2> motion() const noexcept {
         return {Link{first, 1}, Link{carrier, carrier < 0 ? 0. : -1.}};
     }
-    // How a loss torque, referred to the first link, acts on the masses.
-    std::array<Link, 2> loss() const noexcept { return {Link{second, ratio}, Link{carrier, -ratio}}; }
+    // How a loss torque, referred to the first link, acts on the masses: as a column of the SDM, the torque out of the mass; lost
+    // where it is positive and the mesh moves forward.
+    std::array<Link, 2> loss() const noexcept {
+        return {Link{second, ratio}, Link{carrier, carrier < 0 ? 0. : -ratio}};
+    }
     // Where torques are shared out, those of a mesh count half way between its links, as |u|^½ M_1, whichever is called the
     // first: the weight of M_1 is so much of the weight of that.
     double first_link_weight() const noexcept { return 1 / std::fabs(ratio); }

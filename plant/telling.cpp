@@ -209,6 +209,12 @@ void note_release(Work& w, int device, const LossAtRest& loss) SHIFTRIG_REALTIME
     note.capacity = loss.allowed;
 }
 
+void forget_notes(ScratchData& scratch) SHIFTRIG_REALTIME {
+    for (int i = 0; i < scratch.noted_count; ++i)
+        scratch.notes[static_cast<std::size_t>(scratch.noted[static_cast<std::size_t>(i)])] = {};
+    scratch.noted_count = 0;
+}
+
 void tell_instant(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     if (!w.next) return;  // only looks
     const ModelData& m = w.model;
@@ -232,9 +238,7 @@ void tell_instant(Work& w, const Mode& mode, Sample& s) SHIFTRIG_REALTIME {
     // Causes first.
     for (int i = 0; i < scratch.noted_count; ++i) tell(scratch.noted[static_cast<std::size_t>(i)]);
     for (int k = 0; k < m.first_flank; ++k) tell(k);
-    for (int i = 0; i < scratch.noted_count; ++i)
-        scratch.notes[static_cast<std::size_t>(scratch.noted[static_cast<std::size_t>(i)])] = {};
-    scratch.noted_count = 0;
+    forget_notes(scratch);
     copy_states(w.contact, m.contact_bytes, told);
 }
 
@@ -242,7 +246,8 @@ void tell_step(Work& w, const Mode& mode) SHIFTRIG_REALTIME {
     const Sample& s = w.scratch.begin();
     tell_turns(w, s);
     tell_loops(w, mode, s);
-    if (mode.redundant || (mode.wedges && some_pushes(w, mode, s))) w.outputs.certificate.flags |= 1;
+    if (mode.redundant || (mode.wedges && some_pushes(w, mode, s)))
+        w.outputs.certificate.flags |= Certificate::tie_up;
 }
 
 }  // namespace shiftrig::plant::detail

@@ -20,6 +20,9 @@ void note_closing(Work& work, int device, double slip) SHIFTRIG_REALTIME;
 void note_opening(Work& work, int pair, const Sample& sample) SHIFTRIG_REALTIME;
 void note_release(Work& work, int device, const LossAtRest& loss) SHIFTRIG_REALTIME;
 
+// What was noted is not told any more.
+void forget_notes(ScratchData& scratch) SHIFTRIG_REALTIME;
+
 // Tells what is otherwise now than it was before this instant, whatever was tried in between. Of the first instant of a run also the
 // meshes that rest in it.
 void tell_instant(Work& work, const Mode& mode, Sample& sample) SHIFTRIG_REALTIME;

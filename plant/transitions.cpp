@@ -69,8 +69,9 @@ double join(Work& w, const Mode& mode, double* speeds) SHIFTRIG_REALTIME {
     return before - kinetic_energy();
 }
 
-// With x wrong, the acceleration is off by B_r (Ĉ_w − Ĉ_r) M_1, and M_1 grows linearly from the instant of
-// reversal: half of M_1 at the end, over the rest of the part.
+// With the wrong loss, w for the right one, r, the acceleration is off by B_r (Ĉ_w − Ĉ_r) M_1, and M_1 grows linearly from the
+// instant of reversal: half of M_1 at the end, over the rest of the part. The change of speed that is missed grows as t², so
+// twists miss a third of rest · change; of several meshes the longest rest is taken for all.
 Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
     if (!w.scratch.turned) return mode;
     const ModelData& m = w.model;
@@ -86,7 +87,7 @@ Mode& correct_directions(Work& w, Mode& mode) SHIFTRIG_REALTIME {
         const double sign = motion_sign(state), kink = loss_kink(w, k, sign);
         const double from = (begin.torque[m.pairs + k] - kink) * sign * loss_exponent(state);
         const double to = (end.torque[m.pairs + k] - kink) * sign * loss_exponent(state);
-        // From no torque at all (a clutch that begins to press) it is the wrong loss all along; rounding is not that.
+        // From no torque at all (a clutch that begins to press) it is the wrong loss all along; a torque of the size of rounding at both ends is no reversal.
         if (to >= 0 || (from <= 0 && -to <= 1e-6 * m.noteworthy_torque)) continue;
         if (longest == 0) std::fill(change, change + m.masses, 0.);
         const double rest = to / (to - std::max(from, 0.)) * h;  // of the part, after the reversal [s]

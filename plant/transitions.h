@@ -7,8 +7,9 @@ namespace shiftrig::plant::detail {
 
 // Brings contact states and loss directions into agreement with the sample's instant: engages and releases
 // pairs by their capacity, chooses every mesh's x by the lossy torques, opens what is overloaded ([Algin]
-// eq. (12)), lets stuck meshes go. Devices are only opened here, never closed, so it ends. Leaves forces
-// and internal torques of the settled mode in the sample. `complete`: forces and torques are there already.
+// eq. (12)), lets stuck meshes go. Pairs that begin to press at rest close, and where others can take a load, so may what is at
+// rest: it is the bound on passes that says that this ends (beyond it bit 1 of the certificate is set). Leaves forces and
+// internal torques of the settled mode in the sample. `complete`: forces and torques are there already.
 Mode& settle(Work& work, Sample& sample, bool complete = false) SHIFTRIG_REALTIME;
 
 enum class Change {

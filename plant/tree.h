@@ -92,6 +92,7 @@ struct TreeMode {
     // By group:
     int* first = nullptr;   // its first position: where it hangs on its parent
     int* parent = nullptr;  // group, −1: none
+    // Behind `paths`, see TreePaths:
     int* up = nullptr;
     int* path_begin = nullptr;
     int* path_parent = nullptr;
@@ -101,6 +102,7 @@ struct TreeMode {
     int* head = nullptr;
     int* run_begin = nullptr;
     int* run_parent = nullptr;
+    // By group again:
     unsigned char* grounded = nullptr;  // 1: held by a closed pair, 2: by a stuck mesh
     double* mass = nullptr;             // M
     double* inverse_mass = nullptr;     // 1/M, 0 where grounded

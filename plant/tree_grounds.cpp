@@ -62,7 +62,7 @@ void find_grounds(const ModelData& m, Mode& mode, TreeMode& t) SHIFTRIG_REALTIME
     for (int k = 0; k < m.meshes; ++k) {
         const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
         const int g = t.group[topology.position[static_cast<std::size_t>(mesh.first)]];
-        mode.bound[m.pairs + k] = t.grounded[g] == 1 ? by_active_set : 0;
+        mode.bound[m.pairs + k] = t.grounded[g] == 1 ? held_in_set : 0;
         if (!mesh.lossy() || mode.key[m.pairs + k] != 0 || t.grounded[g] != 0) continue;
         t.grounded[g] = 2;
         mode.rows[mode.row_count++] = m.pairs + m.meshes + k;
@@ -71,7 +71,7 @@ void find_grounds(const ModelData& m, Mode& mode, TreeMode& t) SHIFTRIG_REALTIME
     for (int k = 0; k < m.meshes; ++k) {
         const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
         if (t.grounded[t.group[topology.position[static_cast<std::size_t>(mesh.first)]]])
-            mode.bound[m.pairs + k] |= by_stuck_meshes;
+            mode.bound[m.pairs + k] |= held_in_set;
     }
     for (int k = 0; k < m.pairs; ++k) {
         bool held = true;
@@ -79,7 +79,7 @@ void find_grounds(const ModelData& m, Mode& mode, TreeMode& t) SHIFTRIG_REALTIME
             if (link.mass >= 0)
                 held = held && t.grounded[t.group[topology.position[static_cast<std::size_t>(link.mass)]]];
         }
-        mode.bound[k] = held || mode.key[k] ? by_active_set : 0;
+        mode.bound[k] = held || mode.key[k] ? held_in_set : 0;
     }
     if (mode.redundant) find_shared_loads(m, mode, t);
 }

@@ -56,8 +56,7 @@ void weigh_groups(const ModelData& m, const Mode& mode, TreeMode& t) {
             if (edge.rigid >= m.pairs) {
                 const int k = edge.rigid - m.pairs;
                 const Mesh& mesh = m.structure.meshes[static_cast<std::size_t>(k)];
-                const unsigned char key = mode.key[edge.rigid];
-                const double u = mesh.force_ratio(key == 0 ? 0 : key == 2 ? -1 : 1);
+                const double u = mesh.force_ratio(key_exponent(mode.key[edge.rigid]));
                 const bool first = topology.mass[i] == mesh.first;
                 own = first ? 1 : -u;
                 up = first ? -u : 1;

@@ -1,6 +1,7 @@
 // Model, Operators, State, Inputs, Outputs and Scratch never mix: what may be dropped, copied or poisoned
 // without changing a bit; and that stepping allocates nothing.
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <iostream>
@@ -125,6 +126,11 @@ TEST(Roles, ASnapshotOfAnotherMachineIsRefused) {
     EXPECT_TRUE(refuses(3, 5e-4));   // step size
     EXPECT_TRUE(refuses(at.contact, 1e300));
     EXPECT_TRUE(refuses(at.engines, 7));
+    for (const auto byte : std::to_array<unsigned char>({2, 4, 6, 8})) {  // of no mesh
+        std::vector<double> forged = good;
+        reinterpret_cast<unsigned char*>(forged.data() + at.contact)[model.data().pairs] = byte;
+        EXPECT_FALSE(state.restore(model, std::as_bytes(std::span<const double>(forged)))) << int{byte};
+    }
     EXPECT_FALSE(refuses(at.speeds, 100));
 }
 
@@ -164,6 +170,23 @@ TEST(Roles, ObservingChangesNothingAndShowsWhatTheStepEndedWith) {
         if (name.rfind("certificate.", 0) == 0) continue;
         EXPECT_NEAR(drive.rig.outputs.value[i], values[i], 1e-6 * (1 + std::fabs(values[i]))) << name;
     }
+}
+
+// What a look finds changed is not told by the step after it, which sees other inputs.
+TEST(Roles, AStepAfterALookTellsNothingOfIt) {
+    Description d;
+    d.masses = {mass("a", 1), mass("b", 1)};
+    d.clutches = {clutch("c", "a", "b", 100, 1, ActuationDirect{})};
+    d.sources = {source("a", {{{.offset = 10}}})};
+    Rig looked(d), fresh(d);
+    looked.in("clutch.c.engagement") = 1;
+    observe(looked.model, looked.operators, looked.state, looked.inputs, looked.outputs, looked.scratch);
+    EXPECT_GT(looked.out("clutch.c.torque"), 0);
+    looked.in("clutch.c.engagement") = 0;
+    looked.step();
+    fresh.step();
+    EXPECT_TRUE(same(looked, fresh) && same_outputs(looked, fresh));
+    EXPECT_TRUE(looked.events.empty());
 }
 
 TEST(Kernels, AgreeWithThePortableOneToRounding) {

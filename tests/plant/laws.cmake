@@ -1,4 +1,4 @@
-foreach(subject elementary complementarity laws_friction laws_engine laws_hydraulics laws_filling laws_heat laws_sensor device_loops)
+foreach(subject elementary complementarity linear_program laws_friction laws_engine laws_hydraulics laws_filling laws_heat laws_sensor device_loops)
   add_executable(${subject}_test ${CMAKE_CURRENT_LIST_DIR}/${subject}_test.cpp)
   target_link_libraries(${subject}_test PRIVATE shiftrig_plant GTest::gtest_main)
   gtest_discover_tests(${subject}_test)

@@ -237,6 +237,47 @@ TEST(Standstill, LossesAtRestFollowALoadThatTurnsRound) {
     }
 }
 
+// Two clutches close a ring of two gears of different ratio, in → a → out and in → b → out: all is at rest, and the ring holds a
+// load on `out` by a torque T = M_a = −M_b that goes round in it, û_a T − û_b T. With what meshes at rest can lose that is
+// anything from (u_a η_a − u_b/η_b) T to (u_a/η_a − u_b η_b) T, a sum of either sign.
+struct Ring {
+    double ratio_a, efficiency_a, ratio_b, efficiency_b;
+    double most() const { return ratio_a / efficiency_a - ratio_b * efficiency_b; }
+    Description description(bool swapped, Waveform load) const {
+        Description d;
+        d.masses = {mass("in", 0.05), mass("a", 0.02), mass("b", 0.007), mass("out", 0.12)};
+        d.clutches = {clutch("ca", "in", "a", 100), clutch("cb", "in", "b", 120)};
+        for (Clutch& c : d.clutches) c.initially_locked = true;
+        d.gears = {lossy_gear("ga", "a", "out", ratio_a, efficiency_a),
+                   lossy_gear("gb", "b", "out", ratio_b, efficiency_b)};
+        if (swapped) {
+            std::swap(d.masses[0], d.masses[3]);
+            d.gears = {lossy_gear("gb", "out", "b", 1 / ratio_b, efficiency_b),
+                       lossy_gear("ga", "out", "a", 1 / ratio_a, efficiency_a)};
+        }
+        d.sources = {source("out", std::move(load))};
+        return d;
+    }
+};
+
+TEST(Standstill, AJammedRingStaysAtRestAsLongAsItsLossesCanHoldIt) {
+    for (const Ring& ring :
+         {Ring{0.88, 0.82, 0.71, 0.75}, Ring{0.9, 0.5, 0.6, 0.55}, Ring{2, 0.7, 1.7, 0.6}}) {
+        for (const bool swapped : {false, true}) {
+            const double gone = (2 + 100 * ring.most()) / 20;  // [s]
+            Both both(ring.description(swapped, {{{.from = 0, .offset = 2, .slope = -20}}}), gone - 2e-3);
+            for (const double speed : both.forward.state.speeds()) EXPECT_LT(std::fabs(speed), 1e-12);
+            EXPECT_TRUE(both.forward.times(EventKind::break_away, "ca").empty());
+            both.forward.run(gone + 2e-3);
+            both.backward.run(gone + 2e-3);
+            both.expect_mirror_images();
+            const auto times = both.forward.times(EventKind::break_away, "ca");
+            ASSERT_EQ(times.size(), 1u);
+            EXPECT_NEAR(times[0], gone, 1e-6);
+        }
+    }
+}
+
 // The simple rule looks at the ends of steps, but then asks the same of what holds together.
 TEST(Standstill, TheNextStepRuleLetsOthersTakeALoadAsWell) {
     Description d;
